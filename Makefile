@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: run test test-slow lint docs mutants fuzz kills package clean
+.PHONY: run test test-slow lint docs gallery mutants fuzz kills package clean
 
 run: $(READY)
 	mkdir -p out
@@ -24,6 +24,10 @@ lint: $(READY)
 # The manual, in out/docs/index.html. A warning is an error; no network is needed once its packages are installed.
 docs: $(READY)
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+
+# The gallery's pages that are out of date, in docs/gallery: some minutes for all of them.
+gallery: $(READY)
+	$(BIN)/python docs/gallery/make.py
 
 # Changes the lines that judge, one by one, and counts what the tests notice: about an hour, or one with `make mutants MODULE=dominance`.
 mutants: $(READY)

@@ -23,7 +23,7 @@ root_doc = "index"
 templates_path = ["_templates"]
 exclude_patterns = ["_templates"]
 
-myst_enable_extensions = ["deflist", "dollarmath"]
+myst_enable_extensions = ["deflist", "dollarmath", "html_image"]
 myst_heading_anchors = 3
 
 autosummary_generate = True

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from macs import sweep
 from macs.decisions import Dialogue, Larger, PhysicalProgramming, Smaller
-from macs.fronts.front_plot import save_picture
+from macs.fronts.pictures.front_plot import save_picture
 from problems import load
 from transcription import DFET
 

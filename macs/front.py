@@ -18,6 +18,7 @@ from .fronts import files
 from .fronts.merging import merge
 from .fronts.points import Points
 from .fronts.simulated import simulated
+from .fronts.spreadsheets import save_csv
 from .fronts.tables import front_html, front_table, headline
 from .fronts.verified import VERIFY, unmarked, verified
 from .gradients.front_polish import polished
@@ -39,7 +40,7 @@ class Front(Points):
     `trajectories` and more, see `Points`. `stats` has the costs and the seed. If no feasible point was found, the front is empty: `message`
     says why, and `closest` is the least infeasible point.
 
-    - See: `table()`, `plot()`, `front[i].plot()`, `plot_variables()`
+    - See: `table()`, `plot()`, `plot_trajectories()`, `plot_variables()`, `front[i].plot()`
     - Verify: `verified`, `verify()`, `simulate()`, `front[i].simulate()`
     - Improve: `mended()`, `polished()`, `refine_mesh()`
     - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
@@ -82,7 +83,7 @@ class Front(Points):
 
     def _repr_html_(self) -> str:
         """For notebooks: the table and a small picture."""
-        from .fronts.front_plot import front_figure
+        from .fronts.pictures.front_plot import front_figure
         from .fronts.pictures.style import rendered
 
         return front_html(self, rendered(front_figure(self), "png", 80))
@@ -287,11 +288,46 @@ class Front(Points):
         """
         return front_table(self, columns)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates."""
-        from .fronts.front_plot import draw_front
+    def plot(self, ax: Axes | None = None, *, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
+        """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates.
 
-        return draw_front(self, ax)
+        `front.plot().figure.savefig("front.png")` writes the picture to a file.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Default: those of a new figure.
+        marked : numbers of points
+            Points to mark, in the colours of `plot_trajectories`. Default: of two objectives, the best of each.
+        beside : mapping, optional
+            Name -> two objectives (k, 2) of other points, such as a known front; drawn in black and grey.
+        """
+        from .fronts.pictures.front_plot import draw_front
+        from .fronts.pictures.style import check_no_path
+
+        check_no_path(ax, "front.plot()")
+        return draw_front(self, ax, marked, beside)
+
+    def plot_trajectories(self, points: Sequence[int], figure: Figure | None = None) -> np.ndarray:
+        """Axes with the states, controls and path constraints of a few points over time, a colour for each point.
+
+        Parameters
+        ----------
+        points : numbers of points
+            From one to seven.
+        figure : matplotlib Figure, optional
+            Empty figure to draw into. Default: a new one.
+
+        Raises
+        ------
+        ValueError
+            If there are none or too many, or one has no trajectory.
+        """
+        from .fronts.pictures.several_flights import draw_flights
+        from .fronts.pictures.style import check_no_path
+
+        check_no_path(figure, f"front.plot_trajectories({list(points)})[0]")
+        return draw_flights([self[i] for i in points], figure)
 
     def plot_variables(self, figure: Figure | None = None) -> np.ndarray:
         """Axes with each variable of a black box or vector problem along the front, over the first objective, within its bounds.
@@ -302,7 +338,9 @@ class Front(Points):
             For trajectories: `front[i].plot()` draws one of them.
         """
         from .fronts.pictures.design_plot import draw_designs
+        from .fronts.pictures.style import check_no_path
 
+        check_no_path(figure, "front.plot_variables()[0]")
         if self.dynamic:
             raise ValueError("these points are trajectories: draw one of them, front[i].plot()")
         title = f"{self.source.name if self.source else 'black box'}: {counted(len(self), 'point')}"
@@ -324,8 +362,13 @@ class Front(Points):
         return (root_dataset(self) if phase is None else phase_dataset(self, phase)).to_xarray()
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write objectives, violation, status, what a simulation found, and decisions, one row a point, under a header that names units."""
-        files.save_csv(self, path)
+        """Write a table for a spreadsheet, a row for each point, under a header that names units.
+
+        Its columns are the number of the point, objectives, whether it is verified, status, parameters, the times at which phases begin
+        and end (of points without trajectories all their variables), violation and what a simulation found. `front[i].to_csv()` writes a
+        trajectory.
+        """
+        save_csv(self, path)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write everything to one netCDF-4 file with a checksum, whole or not at all.

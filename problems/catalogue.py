@@ -6,13 +6,16 @@ import difflib
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
 from .cases import standard
+from .checks import unknown
 from .problem import DEFAULT_EVALUATIONS, Problem
 from .vector_problem import VectorProblem
 
@@ -124,7 +127,7 @@ def load(name: str, **data: Any) -> Any:
     Raises
     ------
     ValueError
-        There is no such case, file, module or function, or it is none that makes a Problem.
+        There is no such case, file, module or function, it is none that makes a Problem, or it does not take these data.
 
     Examples
     --------
@@ -142,12 +145,8 @@ def load(name: str, **data: Any) -> Any:
         known = ", ".join([*(case for case in CASES if not case.startswith(STANDARD)), f"the published problems {STANDARD}..."])
         raise ValueError(f"there is no problem '{name}'{hint} there are {known}; or give 'file.py:function' or 'package.module:function'")
     function = _builder(_file_module(place) if place.endswith(".py") else _named_module(place, name), function_name, name)
-    try:
-        problem = function(**data)
-    except TypeError as error:
-        if data:
-            raise ValueError(f"problem '{name}' does not take {', '.join(data)}: {error}") from error
-        raise
+    _check_data(function, name, data)
+    problem = function(**data)
     if not isinstance(problem, Problem | VectorProblem):
         raise ValueError(f"'{name}' must return a Problem or a VectorProblem, not {type(problem).__name__}")
     if problem.default_evaluations is None and is_catalogued(name):
@@ -171,6 +170,20 @@ def _builder(module: ModuleType, function_name: str, name: str) -> FunctionType:
             f"problem '{name}': '{function_name}' is not known to return a Problem; annotate it with '-> Problem' or '-> VectorProblem'"
         )
     return function
+
+
+def _check_data(function: FunctionType, name: str, data: Mapping[str, Any]) -> None:
+    """Raise ValueError, before it is called, for data that the function of a problem does not take, and for those that it lacks."""
+    parameters = inspect.signature(function).parameters.values()
+    named = {one.name: one for one in parameters if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)}
+    if not any(one.kind is one.VAR_KEYWORD for one in parameters):
+        for given in data:
+            if given not in named:
+                there_are = f": {unknown('data', given, named)}" if named else ", nor any other data"
+                raise ValueError(f"problem '{name}' does not take {given}{there_are}")
+    lacking = [one for one in named if named[one].default is inspect.Parameter.empty and one not in data]
+    if lacking:
+        raise ValueError(f"problem '{name}' needs data: {', '.join(lacking)}")
 
 
 def _knows_problems(module: ModuleType) -> bool:

@@ -14,7 +14,7 @@ from . import checks
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable, in_time, vector_function
 from .peaks import with_sizes
 from .phase import Phase
-from .sanity import check_numbers
+from .sanity import check_links, check_numbers
 
 DEFAULT_EVALUATIONS = 2_000
 """Default number of evaluations of a case of the catalogue that does not set its own."""
@@ -179,6 +179,10 @@ class Problem:
             raise ValueError(f"{place} has no phase")
         if not self._objectives:
             raise ValueError(f"{place} has no objective; add one with minimize or maximize")
+        # One alone may be: it asks for any feasible trajectory.
+        constant = [name for name, (_, expr) in self._objectives.items() if not ca.symvar(expr)]
+        if constant and len(self._objectives) > 1:
+            raise ValueError(f"objective '{constant[0]}' of {place} is a constant: there is nothing to trade for it")
         phases = list(self._phases.values())
         links = [Link(i, j, _common(phases[i], phases[j]) if states is None else states) for (i, j), states in self._links.items()]
         groups = {f"q{i}": phase._quantity_symbols() for i, phase in enumerate(phases)} | {"p": list(self._symbols.values())}
@@ -195,7 +199,9 @@ class Problem:
             address=self.address,
             data=dict(self.data),
         )
-        check_numbers(compiled, [phase._labels() for phase in phases])
+        labels = [phase._labels() for phase in phases]
+        check_numbers(compiled, labels)
+        check_links(compiled, labels)
         return with_sizes(compiled)
 
     def _objective(self, name: str, expr: Any, unit: str, sense: str, scale: float | None) -> None:

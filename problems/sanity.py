@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,7 @@ from .derived import remembered
 
 SAMPLES, FEW = 2048, 64
 """Most samples; as many as do where each expression is a number at one of them."""
+ROUNDING = 1e-9
 Labels = Mapping[str, Sequence[str]]
 
 
@@ -55,31 +57,84 @@ def _checked(problem: CompiledProblem, labels: Sequence[Labels], count: int) -> 
     """The first `count` samples. Raises ValueError if an expression is a number at none of them."""
     rng = np.random.default_rng(0)
     p = _between(rng, problem.parameters)
-    found = [_quantities(phase, words, p, rng, count) for phase, words in zip(problem.phases, labels, strict=True)]
-    found.append(p[:, :count])
+    draws = [_drawn(phase, rng) for phase in problem.phases]
+    found = _all_quantities(problem, labels, p, draws, count)
     place = f"of problem '{problem.name}'"
     _finite(problem.objectives, found, [f"objective '{goal.name}' {place}" for goal in problem.goals])
     _finite(problem.constraints, found, [f"constraint '{limit.name}' {place}" for limit in problem.limits])
     return found
 
 
-def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, rng: np.random.Generator, count: int) -> np.ndarray:
-    """Samples of a phase's quantities, shape (n_quantities, count)."""
+def _all_quantities(
+    problem: CompiledProblem, labels: Sequence[Labels], p: np.ndarray, draws: Sequence[_Draw], count: int
+) -> list[np.ndarray]:
+    """Samples of the arguments of objectives and constraints."""
+    phases = zip(problem.phases, labels, draws, strict=True)
+    return [*(_quantities(phase, words, p, draw, count) for phase, words, draw in phases), p[:, :count]]
+
+
+def check_links(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
+    """Raise a ValueError that names a constraint which only links make impossible, such as a jump of a state that a link continues."""
+    if not (problem.links and problem.limits):
+        return
+    rng = np.random.default_rng(0)
+    p = _between(rng, problem.parameters)
+    draws = [_drawn(phase, rng) for phase in problem.phases]
+    apart = draws.copy()
+    for link in sorted(problem.links, key=lambda link: problem.order_in_time.index(link.first)):
+        names = [[state.name for state in problem.phases[i].states] for i in (link.first, link.second)]
+        first = draws[link.second].first.copy()
+        for name in link.states:
+            first[names[1].index(name)] = draws[link.first].last[names[0].index(name)]
+        draws[link.second] = replace(draws[link.second], t0=draws[link.first].tf, first=first)
+    try:
+        free, linked = (np.array(problem.constraints(*_all_quantities(problem, labels, p, one, FEW))) for one in (apart, draws))
+    except ValueError:  # few samples are not enough to find numbers, so they say nothing
+        return
+    for limit, before, values in zip(problem.limits, free, linked, strict=True):
+        same = np.ptp(values) <= ROUNDING * max(np.ptp(before), np.abs(values).max())
+        if same and np.ptp(before) > 0.0 and not limit.lower - limit.scale * ROUNDING <= values[0] <= limit.upper + limit.scale * ROUNDING:
+            wanted = f"at least {limit.lower:g}" if values[0] < limit.lower else f"at most {limit.upper:g}"
+            raise ValueError(
+                f"constraint '{limit.name}' of problem '{problem.name}' is {values[0]:g} wherever the links hold, and must be {wanted}: "
+                "a link continues all states that both phases have; name those that do: link(first, second, states=[...])"
+            )
+
+
+@dataclass(frozen=True)
+class _Draw:
+    """Samples of one phase: times, shares of the way, states at both ends and in between, controls; (size, SAMPLES) each."""
+
+    t0: np.ndarray
+    tf: np.ndarray
+    share: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    inside: np.ndarray
+    controls: np.ndarray
+
+
+def _drawn(phase: CompiledPhase, rng: np.random.Generator) -> _Draw:
     t0, tf = _between(rng, [phase.t0]), _between(rng, [phase.tf])
     tf = np.where(tf > t0, tf, np.minimum(t0 + phase.duration[0], phase.tf.upper))
-    share, s = rng.random(SAMPLES), np.vstack([t0, tf, p])
+    share = rng.random(SAMPLES)
     first, last = _within(rng, phase.initial), _within(rng, phase.final)
     # Half of the samples anywhere in the box, half of them near the ways from the initial to the final states.
     inside = np.where(np.arange(SAMPLES) % 2, _between(rng, phase.states), first + share * (last - first))
-    u = _between(rng, phase.controls)
+    return _Draw(t0, tf, share, first, last, inside, _between(rng, phase.controls))
+
+
+def _quantities(phase: CompiledPhase, labels: Labels, p: np.ndarray, draw: _Draw, count: int) -> np.ndarray:
+    """Samples of a phase's quantities, shape (n_quantities, count)."""
+    t0, tf, u, s = draw.t0, draw.tf, draw.controls, np.vstack([draw.t0, draw.tf, p])
 
     def values(function: ca.Function, *inputs: np.ndarray) -> np.ndarray:
         return _finite(function, [one[:, :count] for one in inputs], labels[function.name()])
 
-    along = inside, u, t0 + share * (tf - t0), s
+    along = draw.inside, u, t0 + draw.share * (tf - t0), s
     values(phase.dynamics, *along)
     values(phase.path, *along)
-    initials, finals = values(phase.initials, first, u, t0, s), values(phase.finals, last, u, tf, s)
+    initials, finals = values(phase.initials, draw.first, u, t0, s), values(phase.finals, draw.last, u, tf, s)
     integrals = values(phase.integrands, *along) * (tf - t0)[:, :count]
     return np.vstack([t0[:, :count], tf[:, :count], initials, finals, integrals, values(phase.peaks, *along)])
 

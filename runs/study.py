@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from macs.fronts.verified import VERIFY
 from macs.io.html import html_block, html_table
 from problems.checks import short_repr
+from problems.compiled import Objective
 from transcription import Smooth
 
 from .batch import file as studyfile
@@ -86,8 +87,8 @@ class Study:
         problem's own, or else each variable by itself, after the problem's guess.
     verify : float or None, default 1e-3
         How much a point may miss when it is simulated, in scales, and still be verified, as for `solve`; see `Front.verify`. Reports count
-        only verified points, with their objectives as simulated. None, in a file `false`: points are not simulated, and count as the
-        solver returns them.
+        only points whose states and constraints pass, with their objectives as simulated. None, in a file `false`: points are not
+        simulated, and count as the solver returns them.
     time_limit : float, optional
         Seconds of a run, after which it is ended and recorded as a timeout; called again, it goes on where it was. It changes no number.
     description : str
@@ -148,6 +149,8 @@ class Study:
     trust: bool = field(default=True, repr=False)
     cells: tuple[Cell, ...] = field(init=False, repr=False)
     """Every combination, problems first."""
+    objectives: Mapping[str, tuple[Objective, ...]] = field(init=False, repr=False)
+    """By label of the problem."""
     payloads: Mapping[tuple[str, str, str], Payload] = field(init=False, repr=False)
     """By labels of a cell: its problem and transcription, and its solver, pickled for the processes that run them."""
 
@@ -186,6 +189,7 @@ class Study:
             if self.dispersions is not None:
                 check_dispersions(self.dispersions, stated)
         object.__setattr__(self, "cells", tuple(cell for cell, _ in combined))
+        object.__setattr__(self, "objectives", {label: tuple(problem.goals) for label, problem in stated.items()})
         object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
 
     @classmethod
@@ -252,7 +256,7 @@ class Study:
 
         check_workers(jobs, executor)
         with Store.claim(out, self.definition()) as store:
-            execute(store, self.runs, self._task, jobs, executor, retry, progress)
+            execute(store, self.runs, self._task, self.objectives, jobs, executor, retry, progress)
             return store.summary(self.runs)
 
     def status(self, out: str | PathLike[str]) -> Summary:

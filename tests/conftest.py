@@ -15,8 +15,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# How long an example takes says nothing of what it does: machines are noisy.
-settings.register_profile("macs", deadline=None)
+# How long an example takes says nothing of what it does: machines are noisy. Most properties are of pure functions of few numbers.
+settings.register_profile("macs", deadline=None, max_examples=50)
 settings.load_profile("macs")
 
 LONGEST = (

@@ -19,8 +19,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 FLOORS = ("problems", "transcription", "macs", "runs")
 TARGET = ROOT / "dist"
-NEEDED = ("hypothesis", "markdown-it-py", "pytest", "pytest-xdist")
-"""Packages that the tests need."""
+NEEDED = ("hypothesis", "markdown-it-py", "plotly", "pytest", "pytest-xdist")
+"""Packages that the tests need; plotly is for the page in the browser that the first steps write."""
 TESTS = {"tests/test_stranger.py": "script_of_the_face", "tests/test_manual.py": "first-steps"}
 """Files of tests, and which of their tests are run."""
 LEFT_OUT = (".png",)

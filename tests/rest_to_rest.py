@@ -33,7 +33,7 @@ def cart() -> Problem:
 
 @cache
 def ends() -> Front:
-    return payoff(cart(), MESH)
+    return payoff(cart(), MESH, starts=1)
 
 
 def effort(T: float) -> float:

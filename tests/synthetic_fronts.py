@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,6 +11,7 @@ from macs.front import Front
 from problems import Problem
 from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.numerics.polynomials import nodes
+from transcription.trajectories.costates import Costates, PhaseCostates
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
@@ -70,6 +72,20 @@ def trajectory(rng: np.random.Generator, elements: int = 3, order: int = 4) -> T
         )
         t0 = tf
     return Trajectory(tuple(phases), {"mass": float(rng.uniform(1, 5))})
+
+
+def with_optional_phase(length: float) -> tuple[Trajectory, Costates]:
+    """A trajectory whose coast is so long, with costates that are about 1 on the climb, and a thousand times as large on the coast."""
+    climb, coast = trajectory(np.random.default_rng(0)).phases
+    times = climb.tf + length * np.linspace(0.0, 1.0, len(coast.time))
+    state = replace(coast.state, edges=climb.tf + length * np.linspace(0.0, 1.0, len(coast.state.edges)))
+    flight = Trajectory((climb, replace(coast, time=times, state=state)), {"mass": 2.0})
+    phases = {}
+    for phase, size in zip(flight.phases, (1.0, 1000.0), strict=True):
+        polynomial = PiecewisePolynomial(phase.state.edges, size * np.cos(phase.state.coefficients), "lobatto")
+        names = tuple(one.name for one in phase.state_variables)
+        phases[phase.name] = PhaseCostates(names, polynomial(phase.time), size * np.sin(phase.time), polynomial)
+    return flight, Costates(np.array([0.5, 0.5]), phases)
 
 
 def flights(n: int = 5, seed: int = 0, elements: int | list[int] = 3, **changes) -> Front:

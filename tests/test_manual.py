@@ -33,7 +33,14 @@ PAGES = [
     ROOT / "README.md",
     *(page for page in sorted((ROOT / "docs").rglob("*.md")) if page.relative_to(ROOT / "docs").parts[0] not in OTHERS),
 ]
-SLOW = ("docs/settings.md", "docs/studies.md", "docs/sweep-or-search.md", "docs/stating/objectives.md")
+SLOW = (
+    "docs/clusters.md",
+    "docs/settings.md",
+    "docs/studies.md",
+    "docs/sweep-or-search.md",
+    "docs/vector-problems.md",
+    "docs/stating/objectives.md",
+)
 """Pages that take more than some seconds."""
 COMMANDS = ("docs/first-steps.md",)
 """Pages whose commands are run, one after the other."""

@@ -364,7 +364,8 @@ def check_problem(problem: Any, transcription: Any = None) -> None:
         others = "problems.load makes one from a name, and minimize(...) searches a plain function or a problem of pymoo"
         raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; {others}")
     if transcription is not None and not isinstance(transcription, Transcription):
-        raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
+        others = "; transcription.parse makes one from a word" if isinstance(transcription, str) else ""
+        raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}{others}")
 
 
 def check_freedom(nlp: NLP) -> None:

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 from runs.bench import sources
 from runs.cli.parser import build_parser
-from runs.data.page_header import PageHeader, digest
+from runs.data.page_header import print_standing
 
 HERE = Path(__file__).parent
 STUDIES = HERE.parents[1] / "runs" / "studies"
@@ -33,23 +32,10 @@ def files_of(command: str) -> list[Path]:
     raise ValueError(f"'{command}' makes no page")
 
 
-def verdict(page: Path) -> tuple[str, bool]:
-    """The command of a page or what is wrong with it, and whether the page is as its command would make it now."""
-    try:
-        header = PageHeader.read(page.read_text(encoding="utf-8"))
-        current = digest(*files_of(header.command)) == header.digest
-    except (ValueError, OSError) as error:
-        return str(error), False
-    return f"{header.command}  ({header.date}{'' if current else ', OUT OF DATE'})", current
-
-
 def main(folder: Path = HERE) -> int:
     """Print a line for each page; returns the exit code."""
-    pages: Sequence[Path] = sorted(page for page in folder.glob("*.md") if page.name not in ("index.md", "README.md"))
-    found = {page.name: verdict(page) for page in pages}
-    for name, (words, _) in found.items():
-        print(f"{name}: {words}")
-    return int(not all(good for _, good in found.values()))
+    pages = (page for page in folder.glob("*.md") if page.name not in ("index.md", "README.md"))
+    return int(not print_standing(pages, files_of))
 
 
 if __name__ == "__main__":

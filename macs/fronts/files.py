@@ -1,4 +1,4 @@
-"""A front as one netCDF-4 file, whole or not at all; and as a table of comma-separated values.
+"""A front as one netCDF-4 file, whole or not at all.
 
 Root group: `dataset.root_dataset`. One group for each phase: `dataset.phase_dataset`. Group `_closest`, if there is one: the least
 infeasible point of an empty front, laid out like a root. At the end, a checksum (`io.atomic`), without which nothing of the file is read.
@@ -10,8 +10,6 @@ second reader never meets half of one. It is read into memory too, so that it do
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import warnings
 from collections.abc import Iterator
@@ -82,44 +80,6 @@ def load(path: str | PathLike[str], problem: Any = None, trust: bool = False) ->
         for points in [front] if front._closest is None else [front, front._closest._points]:
             points.source, points._problem = source, known
     return front
-
-
-def save_csv(front: Points, path: str | PathLike[str]) -> None:
-    """Write objectives, violation, status, what a simulation found, and decisions; see `Front.to_csv`."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    columns = [(goal.name, goal.unit) for goal in front.goals]
-    decisions = [(variable.name, variable.unit) for variable in front.variables]
-    simulated = _simulated_columns(front) if front.was_simulated.any() else {}
-    heads = [*columns, ("violation", ""), ("status", ""), *simulated, *decisions]
-    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in heads])
-    for point, objectives, place in zip(front, front.objectives.tolist(), front.places, strict=True):
-        # Of a variable that the point, on a mesh of its own, does not have, the cell is empty.
-        cells = [""] * len(front.variables)
-        for column, value in zip(place.tolist(), point.decision.tolist(), strict=True):
-            cells[column] = repr(value)
-        found = [values[point.index] for values in simulated.values()]
-        writer.writerow([*map(repr, objectives), repr(point.violation), point.status, *found, *cells])
-    write_whole(path, text.getvalue().encode())
-
-
-def _simulated_columns(front: Points) -> dict[tuple[str, str], list[str]]:
-    """What a simulation found, as text by name and unit; empty for a point that was not simulated."""
-    vector = front.source is not None and front.source.vector
-    how = "evaluated again" if vector else "simulated"
-    values = {
-        **({} if vector else {("defect", ""): front.defect}),
-        **{
-            (f"{goal.name}, {how}", goal.unit): column
-            for goal, column in zip(front.goals, (front.simulated_F * front.signs).T, strict=True)
-        },
-        (f"violation, {how}", ""): front.simulated_violation,
-    }
-    verified = {True: "yes", False: "no", None: ""}
-    return {
-        **{name: ["" if np.isnan(value) else repr(value) for value in column.tolist()] for name, column in values.items()},
-        ("verified", ""): [verified[point.verified] for point in front],
-    }
 
 
 def to_bytes(front: Points) -> bytes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -222,29 +224,54 @@ class Point:
             raise ValueError(f"point {self.index} has no trajectory to simulate: its status is '{self.status}'")
         return simulate(problem, self.trajectory, rtol=rtol, atol=atol, method=method)
 
-    def plot(self, figure: Any = None) -> np.ndarray:
-        """Axes with the states, controls and path constraints over time, one for each of them; below, costates and the Hamiltonian, if
-        there are any. Without dynamics, axes with each variable along its front, and this point in it.
+    def plot(self, figure: Any = None, *, costates: bool = False) -> np.ndarray:
+        """Axes with the states, controls and path constraints over time, one for each of them. Without dynamics, axes with each variable
+        along its front, and this point in it.
 
-        The title says whether a point is not verified or not feasible; then the nodes of its trajectory are hollow.
+        `front[i].plot()[0].figure.savefig("point.png")` writes the picture to a file. The title says whether a point is not feasible, not
+        verified or not simulated. Nodes of the first two are hollow.
+
+        Parameters
+        ----------
+        figure : matplotlib Figure, optional
+            Empty figure to draw into. Default: a new one.
+        costates : bool
+            Whether costates and the Hamiltonian are drawn below, if there are any.
         """
         from .pictures.design_plot import draw_designs
         from .pictures.flight_plot import draw_flight
-        from .pictures.kinds import remark
+        from .pictures.kinds import hollow, remark
+        from .pictures.style import check_no_path, raised
 
+        check_no_path(figure, f"front[{self.index}].plot()[0]")
         said = remark(self)
-        title = f"{self.title}; {said}" if said else self.title
+        named = self._named(raised)
+        title = f"{named}; {said}" if said else named
         if not self._points.dynamic:
             return draw_designs(self._points, title, figure, [self.index])
         if self.trajectory is None:
             raise ValueError("there is no trajectory to draw: the evaluation of the point failed")
-        return draw_flight(self.trajectory, title, figure, self.costates, hollow=bool(said))
+        return draw_flight(self.trajectory, title, figure, self.costates if costates else None, hollow=hollow(self))
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the trajectory as a table for a spreadsheet, a row for each node, under a header that names units.
+
+        Its columns are the phase, time, states, controls, path constraints, and the costates and the Hamiltonian if there are any. Without
+        dynamics it is the row of the point in `Front.to_csv`.
+        """
+        from .spreadsheets import save_point_csv
+
+        save_point_csv(self, path)
 
     @property
     def title(self) -> str:
         """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
+        return self._named(str)
+
+    def _named(self, unit: Callable[[str], str]) -> str:
+        """The objectives in one line, with units as this writes them."""
         named = zip(self.goals, self.objectives.values(), strict=True)
-        return ", ".join(f"{goal.name} {value:.6g}{f' {goal.unit}' if goal.unit else ''}" for goal, value in named)
+        return ", ".join(f"{goal.name} {value:.6g} {unit(goal.unit)}".rstrip() for goal, value in named)
 
     def _repr_html_(self) -> str:
         """For notebooks: a table of the objectives and a small picture."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..evaluation.evaluator import CONVERGED
 from ..io.html import html_block, html_table
 from ..io.text import call, counted, duration, numbers, text_table
-from .verified import AGAIN, MISSES, objective_scales
+from .verified import AGAIN, MISSES, constant_objectives, objective_scales
 
 if TYPE_CHECKING:
     from .point import Point
@@ -176,7 +176,8 @@ FEW = 5
 
 def footer(front: Points) -> list[str]:
     """Lines below the table of a front with points: how many are verified, notes and warnings."""
-    lines = _simulated(front) if front.was_simulated.all() else _between_nodes(front) if front.dynamic else []
+    lines = _simulated(front) if front.was_simulated.all() else _not_simulated(front) if front.dynamic else []
+    lines += _without_conflict(front)
     bad = int((front.status != CONVERGED).sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
@@ -193,10 +194,21 @@ def footer(front: Points) -> list[str]:
     missing = [point.index for point in front if MISSES in point.note or AGAIN in point.note]
     lines += [f"Point {point.index}: {point.note}." for point in front if point.note and point.index not in missing[FEW:]]
     if len(missing) > FEW:
-        lines.append(f"The notes of {len(missing) - FEW} more points say what they miss.")
+        rest = len(missing) - FEW
+        lines.append(f"The note{'s' if rest > 1 else ''} of {counted(rest, 'more point')} say{'' if rest > 1 else 's'} what is missed.")
     if front.message:
         lines.append(front.message)
     return lines
+
+
+def _without_conflict(front: Points) -> list[str]:
+    """Which of several objectives are not in conflict with the others, as far as these points tell."""
+    if len(front.goals) < 2:
+        return []
+    if len(front) == 1:
+        return ["No other point was found that is better in any objective."] if front.stats.get("stopped") != "running" else []
+    same = [goal.name for goal, constant in zip(front.goals, constant_objectives(front), strict=True) if constant]
+    return [f"'{name}' is the same at all points: it is not in conflict with the other objectives." for name in same]
 
 
 def _simulated(front: Points) -> list[str]:
@@ -206,9 +218,17 @@ def _simulated(front: Points) -> list[str]:
     if count == len(front):
         how = "evaluated again" if _is_vector(front) else "simulated by an independent integrator"
         return [f"{points} verified: {how}, nothing differs by more than {verify:g}."]
+    remedy = "" if _is_vector(front) else " front.mended() solves again where points miss something."
     if not count:
-        return ["The point is not verified." if len(front) == 1 else f"None of {len(front)} points is verified."]
-    return [f"{count} of {counted(len(front), 'point')} {'is' if count == 1 else 'are'} verified."]
+        return [("The point is not verified." if len(front) == 1 else f"None of {len(front)} points is verified.") + remedy]
+    return [f"{count} of {counted(len(front), 'point')} {'is' if count == 1 else 'are'} verified.{remedy}"]
+
+
+def _not_simulated(front: Points) -> list[str]:
+    """That trajectories were not simulated, what does it, and what leaves its bounds between nodes."""
+    count = int((~front.was_simulated).sum())
+    which = "The point was" if len(front) == 1 else f"{count} of {len(front)} points were" if count < len(front) else "The points were"
+    return [f"{which} not simulated: front.verify() does that, or `macs verify` of the file.", *_between_nodes(front)]
 
 
 def _between_nodes(front: Points) -> list[str]:

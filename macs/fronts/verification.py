@@ -133,9 +133,9 @@ def verify(
             (not objectives <= EQUAL, f"stored objectives differ from recomputed ones by {objectives:.1e}"),
             (not abs(violation - point.violation) <= limit, f"stored violation {point.violation:.1e}, recomputed {violation:.1e}"),
             (point.status != CONVERGED, f"its status is '{point.status}'"),
-            (not violation <= limit, f"violates '{worst}' by {violation:.1e} (tolerance {limit:.0e})"),
+            (not violation <= limit, f"violates {worst} by {violation:.1e} (tolerance {limit:.0e})"),
             (not defect <= tolerance, f"simulated, it ends {defect:.1e} away (tolerance {tolerance:.1e})"),
-            (not simulated <= tolerance, f"simulated, it violates '{most}' by {simulated:.1e} (tolerance {tolerance:.1e})"),
+            (not simulated <= tolerance, f"simulated, it violates {most} by {simulated:.1e} (tolerance {tolerance:.1e})"),
             (not miss <= tolerance, f"simulated, its objectives differ by {miss:.1e} (tolerance {tolerance:.1e})"),
         )
         return Check(index, mismatch, violation, objectives, defect, simulated, miss, tuple(reason for wrong, reason in failures if wrong))
@@ -164,7 +164,7 @@ def _verify_rows(front: Points, problem: CompiledVectorProblem, tolerance: float
             (not apart[i] <= tolerance, f"evaluated again, its objectives differ by {apart[i]:.1e} (tolerance {tolerance:.1e})"),
             (changed, f"stored violation {point.violation:.1e}, evaluated again {violation[i]:.1e}"),
             (point.status != CONVERGED, f"its status is '{point.status}'"),
-            (not violation[i] <= allowed, f"violates '{worst}' by {violation[i]:.1e} (tolerance {allowed:.0e})"),
+            (not violation[i] <= allowed, f"violates {worst} by {violation[i]:.1e} (tolerance {allowed:.0e})"),
         )
         reasons = tuple(reason for wrong, reason in failures if wrong)
         return Check(i, 0.0, float(violation[i]), float(off[i]), 0.0, float(violation[i]), float(apart[i]), reasons)

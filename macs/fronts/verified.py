@@ -155,7 +155,7 @@ def _evaluated(points: Kind, tolerance: float) -> Kind:
             found.append(f"its '{points.names[k]}' differs by {off[i, k] * scales[k]:.2g} {points.goals[k].unit}".rstrip())
         if allowed < violation[i] < np.inf:
             worst = max(violations[i], key=lambda name: violations[i][name])
-            found.append(f"it violates '{worst}' by {violation[i]:.1e}")
+            found.append(f"it violates {worst} by {violation[i]:.1e}")
         notes[i] = "; ".join(filter(None, [notes[i], AGAIN + ", ".join(found) if found else ""]))
     return points.replace(
         violations=violations,
@@ -166,6 +166,14 @@ def _evaluated(points: Kind, tolerance: float) -> Kind:
         notes=notes,
         stats={**points.stats, "verify": float(tolerance), **_more_rows(points, len(points))},
     )
+
+
+def feasible_when_simulated(points: Points, tolerance: float) -> np.ndarray:
+    """Mask (n,) of the points that are verified but for what they say of their objectives, whose simulated values take their place."""
+    if not points.dynamic:
+        tolerance = max(tolerance, points.stats["tolerance"])
+    numbers = np.isfinite(points.simulated_F).all(axis=1)
+    return (points.status == CONVERGED) & numbers & (points.defect <= tolerance) & (points.simulated_violation <= tolerance)
 
 
 def with_nearest(points: Kind) -> Kind:
@@ -217,14 +225,24 @@ def accuracy(tolerance: float) -> tuple[float, float]:
 def objective_scales(points: Points) -> np.ndarray:
     """What counts as one in each objective (m,): the scale that was stated, or the range over the feasible points; the size of one that
     hardly varies; and at least a small part of how much it varies within the bounds of the problem, if that is known."""
-    good = (points.status == CONVERGED) & np.isfinite(points.F).all(axis=1)
-    F = points.F[good] if good.any() else np.zeros((1, len(points.goals)))
-    sizes, ranges = np.abs(F).max(axis=0), np.ptp(F, axis=0)
-    found = np.where(ranges > CONSTANT * sizes, ranges, sizes)
-    if isinstance(points.problem, CompiledProblem):
-        found = np.maximum(found, NOTHING * objective_spreads(points.problem))
+    sizes, ranges, least = _variation(points)
+    found = np.maximum(np.where(ranges > CONSTANT * sizes, ranges, sizes), least)
     given = np.array([goal.scale or 0.0 for goal in points.goals])
     return np.where(given > 0.0, given, np.where(found > 0.0, found, 1.0))
+
+
+def constant_objectives(points: Points) -> np.ndarray:
+    """Mask (m,) of the objectives that are the same at all feasible points, but for what no solver can tell apart."""
+    sizes, ranges, least = _variation(points)
+    return ranges <= np.maximum(CONSTANT * sizes, least)
+
+
+def _variation(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each objective (m,): its largest size and its range over the feasible points, and the smallest scale that it may have."""
+    good = (points.status == CONVERGED) & np.isfinite(points.F).all(axis=1)
+    F = points.F[good] if good.any() else np.zeros((1, len(points.goals)))
+    least = NOTHING * objective_spreads(points.problem) if isinstance(points.problem, CompiledProblem) else np.zeros(F.shape[1])
+    return np.abs(F).max(axis=0), np.ptp(F, axis=0), least
 
 
 def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
@@ -244,11 +262,13 @@ def _misses(
 ) -> list[str]:
     """In words, what a point misses by more than the tolerance; `other` of its objectives."""
     label, violation = worst
+    if not np.isfinite(defect):
+        return [f"{MISSES}its states grow beyond all numbers, or their rates are no numbers somewhere along it"]
     found = []
     if not defect <= tolerance:
         found.append(f"its states differ by {defect:.1e} of their bounds{_growing(problem, trajectory, tolerance) if remark else ''}")
     if not violation <= tolerance:
-        found.append(f"it violates '{label}' by {violation:.1e}")
+        found.append(f"it violates {label} by {violation:.1e}")
     if other:
         found.append(other)
     return [MISSES + ", ".join(found)] if found else []

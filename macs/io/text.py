@@ -31,7 +31,11 @@ def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], 
 
 
 def numbers(values: Any) -> list[str]:
-    """A column of numbers with the same number of decimals: six significant digits, and at least four of the column's range."""
+    """A column of numbers with the same number of decimals: six significant digits, and at least four of the column's range.
+
+    A number that would have fewer than five significant digits has more decimals, unless it is less than a millionth of the largest; the
+    decimal points stay below each other.
+    """
     values = np.asarray(values, dtype=float) + 0.0
     finite = values[np.isfinite(values)]
     largest = np.abs(finite).max(initial=0.0)
@@ -42,7 +46,10 @@ def numbers(values: Any) -> list[str]:
     if span > 1e-9 * largest:
         digits = max(digits, 3 - _decade(span))
     digits = int(np.clip(digits, 0, 11 - _decade(largest)))
-    return [f"{value:.{digits}f}" for value in values]
+    small = np.isfinite(values) & (np.abs(values) >= 1e-6 * largest) & (values != 0)
+    own = [max(digits, 4 - _decade(abs(value))) if more else digits for value, more in zip(values, small.tolist(), strict=True)]
+    width = max(own, default=0)
+    return [f"{value:.{n}f}{' ' * (width - n + (n == 0 < width))}" for value, n in zip(values, own, strict=True)]
 
 
 def counted(number: int, what: str) -> str:

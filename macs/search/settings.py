@@ -56,8 +56,8 @@ class Settings:
     search. If the problem has derivatives, gradient solves refine agents during the search and polish the archive at its end.
 
     `MACS()` suits most problems. Five settings matter first: `agents`, `archive`, `refine`, `mesh` and `prefer`; all others are further
-    settings, under Other Parameters. `MACS(refine=False)` uses no derivatives. `MACS.paper()` has the settings of the paper (Ricciardi and
-    Vasile 2015; with trajectories: Ricciardi, Vasile and Maddock 2016); values of its Table I are given below.
+    settings, under Other Parameters. `MACS(refine=False)` makes no gradient solves. `MACS.paper()` has the settings of the paper (Ricciardi
+    and Vasile 2015; with trajectories: Ricciardi, Vasile and Maddock 2016); values of its Table I are given below.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Settings:
         What is done after the search, unless it was ended by Ctrl-C, a time limit or a callback, for optimal control problems. "mended":
         points that a simulation does not confirm are solved again on finer meshes, see `Front.mended`. "fixed": all points stay on the mesh
         of the search. "adaptive": each point is solved on a mesh of its own until a simulation confirms it, see `Front.refine_mesh`.
-        Without derivatives ("refine=False") points are not mended.
+        With `refine=False` points are not mended.
     prefer : Preference or dict, optional
         What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
         the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
@@ -232,7 +232,7 @@ class Settings:
         except ValueError as error:
             raise ValueError(f"MACS: polish_on: {error}") from error
         if not self.refine:
-            raise ValueError("MACS: polish_on makes no sense with refine=False, which uses no derivatives")
+            raise ValueError("MACS: polish_on makes no sense with refine=False, which makes no gradient solves")
         if self.mesh == "adaptive":
             raise ValueError("MACS: polish_on makes no sense with mesh='adaptive': its points are on the mesh that it names")
 

@@ -33,7 +33,7 @@ from ..refinement.search_mesh import search_transcription
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
-from .start import beginning, check_run, decisions, drawing
+from .start import beginning, check_run, check_start, decisions, drawing
 
 log = logging.getLogger(__name__)
 
@@ -164,6 +164,7 @@ class Solver(SearchMethod):
         solver = inner_solver(inner)
         compiled = problem.compile() if isinstance(problem, Problem) else problem
         self.check_goals(compiled.goals)
+        check_start(start, compiled)
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
         earlier, chosen = Counts(), None
         with Interrupts(time_limit) as interrupts, numbers_may_blow_up():

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from problems.checks import check_count, check_positive, unknown
-from problems.compiled import Variable
+from problems.compiled import CompiledProblem, Variable
 from transcription.base import NLP
 from transcription.smooth import Smooth
+from transcription.trajectories.trajectory import Trajectory
 
 from ..fronts.point import Point
 from ..fronts.points import Points
@@ -22,7 +23,7 @@ STARTS = ("uniform", "smooth")
 """Words for the way first candidates are drawn."""
 
 
-OTHER = "start: the points have other variables; a start belongs to one problem"
+OTHER = "start: the points have other variables; a start belongs to one problem, with these data or others"
 
 
 def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
@@ -54,8 +55,8 @@ def drawing(start: Any) -> Smooth | str | None:
 def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
     """Full vectors (k, D) that a search begins with: with `guess` the problem's guess, then the vectors of `start`; None if there are none.
 
-    `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points of the same problem on other
-    meshes are interpolated.
+    `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points on other meshes are
+    interpolated; those of the problem with other data, such as other bounds, are moved into the bounds.
     """
     rows = []
     own = guessed_start(nlp) if guess else None
@@ -63,7 +64,7 @@ def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
         rows.append(own)
     points = _points(start)
     if points:
-        rows.append(decisions(np.array([_on_mesh(point, nlp) for point in points]), nlp.variables))
+        rows.append(np.array([_on_mesh(point, nlp) for point in points]))
     elif start is not None:
         given = _array(start)
         if given.shape[1] == len(nlp.free) != len(nlp.variables):
@@ -74,12 +75,12 @@ def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
 
 
 def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
-    """Decisions (k, D) that a search begins with, checked against their bounds.
+    """Decisions (k, D) that a search begins with, within their bounds. Points may be those of other bounds, and are moved into these.
 
     Raises
     ------
     ValueError
-        If they have another length, are not numbers, or are outside the bounds; the message names the variable.
+        If they have another length, are not numbers, or, in an array, are outside the bounds; the message names the variable.
     """
     points = _points(start)
     for point in points:
@@ -89,7 +90,8 @@ def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
     if Z.shape[1] != len(variables):
         raise ValueError(f"start: decisions have {Z.shape[1]} entries, {len(variables)} expected")
     lower, upper, scale = (np.array([getattr(v, name) for v in variables]) for name in ("lower", "upper", "scale"))
-    wrong = ~np.isfinite(Z) | (lower - 1e-6 * scale > Z) | (upper + 1e-6 * scale < Z)
+    outside = (lower - 1e-6 * scale > Z) | (upper + 1e-6 * scale < Z)
+    wrong = ~np.isfinite(Z) if points else ~np.isfinite(Z) | outside
     if wrong.any():
         row, column = np.argwhere(wrong)[0]
         v = variables[column]
@@ -104,12 +106,30 @@ def _points(start: Any) -> list[Point]:
 
 
 def _on_mesh(point: Point, nlp: NLP) -> np.ndarray:
-    """The decision vector (n,) of a point, interpolated if the point is on another mesh."""
+    """The decision vector (n,) of a point, within the bounds, interpolated if the point is on another mesh."""
     if [v.name for v in point.variables] == [v.name for v in nlp.variables] and point.transcription == nlp.transcription.to_dict():
-        return point.decision
-    if point.source is None or point.source.fingerprint != nlp.problem.fingerprint or point.trajectory is None:
+        return decisions([point], nlp.variables)[0]
+    if point.trajectory is None or _named(point.trajectory) != _named(nlp.problem):
         raise ValueError(OTHER)
     return nlp.interpolate(point.trajectory)
+
+
+def check_start(start: Any, problem: CompiledProblem) -> None:
+    """Raise ValueError for an unknown word, and for points that are not of this problem, whatever its data are; no mesh is needed."""
+    drawing(start)
+    for point in _points(start):
+        if point.trajectory is not None and _named(point.trajectory) != _named(problem):
+            raise ValueError(OTHER)
+
+
+def _named(what: Trajectory | CompiledProblem) -> tuple[Any, ...]:
+    """The names of parameters, and of the states and controls of each phase."""
+    if isinstance(what, CompiledProblem):
+        given: Iterable[Any] = (v.name for v in what.parameters)
+        phases = [(phase.name, phase.states, phase.controls) for phase in what.phases]
+    else:
+        given, phases = what.parameters, [(phase.name, phase.state_variables, phase.control_variables) for phase in what.phases]
+    return frozenset(given), *((name, *([v.name for v in part] for part in parts)) for name, *parts in phases)
 
 
 def _array(start: Any) -> np.ndarray:

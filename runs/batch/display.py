@@ -8,6 +8,7 @@ from typing import Any, Self, TextIO
 from macs.io.console import Display, minutes
 
 from ..execution.task import FINISHED, Outcome
+from .progress import Going
 from .store import StoredRun, reason
 
 SHOWN = 20
@@ -58,11 +59,17 @@ class StudyDisplay(Display):
             self._failed += 1
             self.say(f"{self._title}: run {run.number} of {run.cell.name} {reason(outcome.status, outcome.message)}")
 
+    def going(self) -> tuple[list[Going], float | None]:
+        """The runs that are being made, and the seconds that the rest takes if it goes on like this; None if that is not known yet."""
+        now = [Going(run.cell.folder, run.number, evaluations, elapsed) for run, evaluations, elapsed in list(self._going.values())]
+        done = self._done + sum(one.evaluations for one in now)
+        return now, self.elapsed * (self._work - done) / done if 0 < done < self._work else None
+
     def line(self) -> str:
         """glides: 12 of 30 finished, 1 failed, 17 left; 0:41, 1:02 to go."""
-        done = self._done + sum(evaluations for _, evaluations, _ in list(self._going.values()))
+        _, seconds = self.going()
         left = self._total - self._finished - self._failed
-        ahead = f", {minutes(self.elapsed * (self._work - done) / done)} to go" if left and 0 < done < self._work else ""
+        ahead = f", {minutes(seconds)} to go" if left and seconds is not None else ""
         failed = f", {self._failed} failed" if self._failed else ""
         return f"{self._title}: {self._finished} of {self._total} finished{failed}, {left} left; {minutes(self.elapsed)}{ahead}"
 

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import queue
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from pathlib import Path
 
 from problems.checks import check_count
+from problems.compiled import Objective
 
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, Task
 from ..execution.workers import ExecutorWorkers, LocalWorkers
 from .display import StudyDisplay
+from .progress import ProgressFile
 from .store import MISSING, UNREADABLE, Store, StoredRun
 
 AGAIN = (MISSING, UNREADABLE, KILLED, TIMEOUT, MEMORY)
@@ -33,7 +35,14 @@ def check_workers(jobs: int, executor: Executor | None) -> None:
 
 
 def execute(
-    store: Store, count: int, task_of: Callable[[StoredRun, Path], Task], jobs: int, executor: Executor | None, retry: bool, progress: bool
+    store: Store,
+    count: int,
+    task_of: Callable[[StoredRun, Path], Task],
+    goals: Mapping[str, Sequence[Objective]],
+    jobs: int,
+    executor: Executor | None,
+    retry: bool,
+    progress: bool,
 ) -> None:
     """Make the runs that a study's folder lacks, `count` of each cell. However this ends, the workers are stopped, and runs finished by
     then are stored.
@@ -44,6 +53,8 @@ def execute(
     count : int
     task_of : callable
         (run, path of its checkpoint) -> the task that makes it.
+    goals : {problem: sequence of Objective}
+        By label.
     jobs, executor, retry, progress
         As for `Study.run`.
     """
@@ -55,7 +66,8 @@ def execute(
     workers: LocalWorkers | ExecutorWorkers = LocalWorkers(min(jobs, len(todo))) if executor is None else ExecutorWorkers(executor)
     runs: dict[Future[Outcome], StoredRun] = {}
     done: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
-    with StudyDisplay(store.definition["name"], every, todo, shown=progress) as display:
+    display = StudyDisplay(store.definition["name"], every, todo, shown=progress)
+    with display, ProgressFile(store.path, goals, display.going) as told:
 
         def keep(run: StoredRun, outcome: Outcome) -> None:
             store.keep(run, outcome)
@@ -68,6 +80,7 @@ def execute(
                 future.add_done_callback(done.put)
             while runs:
                 display.refresh()
+                told.refresh()
                 try:
                     future = done.get(timeout=REFRESH)
                 except queue.Empty:

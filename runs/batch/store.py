@@ -5,6 +5,7 @@ CELL/RUN.nc     the front of a finished run, 0001.nc being the first: a run is f
 CELL/RUN.json   the record of a run: of a finished one its history, of any other its status and traceback
 CELL/RUN.checkpoint, CELL/RUN.samples   the state of a run that has begun and not ended, written by its own process
 .lock           the lock of the process that runs the study
+.progress       how that process proceeds, written every second and deleted at its end, see `progress`
 
 Every file is written whole, all but checkpoints and samples by the process that runs the study. Those in JSON are records with a checksum.
 """
@@ -22,7 +23,7 @@ from functools import cached_property
 from itertools import groupby
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 from zlib import crc32
 
 import msgspec
@@ -215,7 +216,7 @@ class Store:
         self.trust = trust
 
     @classmethod
-    def open(cls, out: str | PathLike[str], trust: bool = False) -> Store:
+    def open(cls, out: str | PathLike[str], trust: bool = False) -> Self:
         """The folder of a study. Raises ValueError if there is none, or it cannot be read."""
         path = Path(out)
         record = path / "study.json"

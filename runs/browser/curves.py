@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from macs.fronts.pictures.flight_plot import FLAT, costates_worth
+from macs.fronts.pictures.flight_plot import costate_ranges, has_length
+from macs.fronts.pictures.style import per
 from problems.compiled import Limit, Variable
-from transcription.trajectories.costates import Costates
+from transcription.trajectories.costates import Costates, PhaseCostates
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 DIGITS = 6
@@ -36,27 +37,28 @@ def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list
     Returns
     -------
     list of dict
-        Of each phase "name", "unit" (of time), "t0", "tf", "elements" (their number), "times" (lists of times) and "quantities". A
-        quantity has "name", "kind" ("state", "control", "path", "costate" or "hamiltonian"), "unit" (of costates and the
-        Hamiltonian what they are per, such as "per km"), "lower" and "upper" (None where there is no limit), "least" (the least range that
-        means anything), "t" (which of the "times") and "v" (values, None in gaps).
+        Of each phase "name", "unit" (of time), "t0", "tf", "lasts" (False: it has no length, and no costates), "elements" (their
+        number), "times" (lists of times) and "quantities". A quantity has "name", "kind" ("state", "control", "path", "costate" or
+        "hamiltonian"), "unit" (of costates and the Hamiltonian what they are per, such as "per km"), "lower" and "upper" (None where there
+        is no limit), "least" (the least range that means anything), "t" (which of the "times") and "v" (values, None in gaps).
     """
     found = []
-    worths = None if costates is None else max(costates_worth(phase, costates[phase.name]) for phase in trajectory.phases)
+    least = None if costates is None else costate_ranges(trajectory, costates)
     for phase in trajectory.phases:
         writer = _Writer(most)
         writer.polynomial("state", phase.state_variables, phase.state, phase.state.on_elements, jumps=False)
         writer.polynomial("control", phase.control_variables, phase.control, phase.controls_on_elements, jumps=True)
         for limit, values in zip(phase.path_limits, phase.paths.T, strict=True):
             writer.add(limit.name, "path", "", limit, phase.time, values)
-        if costates is not None and worths is not None and phase.name in costates:
-            _write_costates(writer, phase, costates, worths)
+        if costates is not None and least is not None and has_length(trajectory, phase):
+            _write_costates(writer, phase, costates[phase.name], least)
         found.append(
             {
                 "name": phase.name,
                 "unit": phase.time_unit,
                 "t0": phase.t0,
                 "tf": phase.tf,
+                "lasts": has_length(trajectory, phase),
                 "elements": len(phase.state.edges) - 1,
                 "times": writer.times,
                 "quantities": writer.quantities,
@@ -65,34 +67,19 @@ def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list
     return found
 
 
-def _write_costates(writer: _Writer, phase: PhaseTrajectory, costates: Costates, worths: float) -> None:
-    """Add the costates of a phase and its Hamiltonian. What is worth less than `FLAT` of all costates is round-off."""
-    own = costates[phase.name]
-    ranges = {name: float(np.ptp(phase[name])) for name in own}
+def _write_costates(writer: _Writer, phase: PhaseTrajectory, own: PhaseCostates, least: Mapping[str | None, float]) -> None:
+    """Add the costates of a phase and its Hamiltonian."""
     units = {variable.name: variable.unit for variable in phase.state_variables}
     writer.polynomial(
         "costate",
-        [Variable(name, -np.inf, np.inf, _per(units[name])) for name in own.names],
+        [Variable(name, -np.inf, np.inf, per(units[name])) for name in own.names],
         own.polynomial,
         own.polynomial.on_elements,
         jumps=True,
-        least={name: FLAT * worths / span if span > 0 else 0.0 for name, span in ranges.items()},
+        least=least,
     )
-    length = float(np.ptp(phase.time))
     none = Limit("", -np.inf, np.inf)
-    writer.add(
-        "Hamiltonian",
-        "hamiltonian",
-        _per(phase.time_unit),
-        none,
-        phase.time,
-        own.hamiltonian,
-        FLAT * worths / length if length > 0 else 0.0,
-    )
-
-
-def _per(unit: str) -> str:
-    return f"per {unit}" if unit else ""
+    writer.add("Hamiltonian", "hamiltonian", per(phase.time_unit), none, phase.time, own.hamiltonian, least[None])
 
 
 class _Writer:
@@ -111,7 +98,7 @@ class _Writer:
         polynomial: PiecewisePolynomial,
         on_elements: Callable[[np.ndarray], np.ndarray],
         jumps: bool,
-        least: Mapping[str, float] | None = None,
+        least: Mapping[str | None, float] | None = None,
     ) -> None:
         """Add quantities that are polynomials on elements; without `jumps` they are continuous, and each end is sampled once."""
         elements, coefficients, _ = polynomial.coefficients.shape

@@ -18,12 +18,16 @@ import msgspec
 
 STATIC = Path(__file__).parent / "static"
 SCRIPTS = (
-    *("words.js", "source.js", "state.js", "looks.js", "scatter.js", "parallel.js", "preferences.js", "point.js", "flight.js", "table.js"),
+    *("words.js", "state.js", "looks.js", "scatter.js", "parallel.js", "preferences.js", "point.js", "flight.js", "table.js"),
     *("study.js", "main.js"),
 )
 """In the order in which they build on each other."""
+EMBEDDED, LIVE = "embedded.js", ("progress.js", "live.js")
+"""Where data come from: this file, or a server."""
 POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'none'"
 """Content Security Policy: nothing from another place. 'unsafe-eval': the drawing package compiles programs for the graphics card."""
+LIVE_POLICY = "default-src 'none'; script-src 'self' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'"
+"""That of a page with a server: nothing but from that."""
 
 
 def page(data: Mapping[str, Any], blocks: Mapping[str, bytes]) -> bytes:
@@ -47,10 +51,12 @@ def page(data: Mapping[str, Any], blocks: Mapping[str, bytes]) -> bytes:
         safe_json(data),
         b"</script>\n",
     ]
+    parts += [b"<script>\n", _scripts(*SCRIPTS, EMBEDDED), b"</script>\n"]
+    # What needs no figure is there before the drawing package has been read, and all figures before the details of points.
+    parts += [b"<script>\n", plotly(), b"\n</script>\n<script>drawFigures();</script>\n"]
     for name, content in blocks.items():
         parts += [f'<script type="application/octet-stream" id="block-{name}">'.encode(), base64.b64encode(content), b"</script>\n"]
-    parts += [b"<script>\n", plotly(), b"\n</script>\n<script>\n", scripts(), b"</script>\n</body>\n</html>\n"]
-    return b"".join(parts)
+    return b"".join([*parts, b"</body>\n</html>\n"])
 
 
 def packed(content: Any) -> bytes:
@@ -72,10 +78,20 @@ def _head(title: str, policy: str) -> bytes:
     return text.encode()
 
 
-@lru_cache(maxsize=1)
-def scripts() -> bytes:
+def live_page(title: str) -> bytes:
+    """A page without data, which its scripts ask its server for."""
+    return _head(title, LIVE_POLICY) + b'<script src="scripts.js"></script>\n<script src="plotly.js" defer></script>\n</body>\n</html>\n'
+
+
+def live_scripts() -> bytes:
+    """Our own scripts of such a page."""
+    return _scripts(*SCRIPTS, *LIVE)
+
+
+@lru_cache(maxsize=2)
+def _scripts(*names: str) -> bytes:
     """Our own scripts, one after the other."""
-    return b"\n".join((STATIC / name).read_bytes() for name in SCRIPTS)
+    return b"\n".join((STATIC / name).read_bytes() for name in names)
 
 
 @lru_cache(maxsize=1)

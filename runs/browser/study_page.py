@@ -7,17 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from macs.front import Front
 from macs.io.console import Steps
 from problems.compiled import Objective
 
-from ..batch.store import Store, StoredRun, Summary, reason
+from ..batch.store import MISSING, Store, StoredRun, Summary, reason
 from ..measures.attainment import attainment, staircase
 from ..measures.convergence import Band, band
 from ..measures.indicators import minimised, pieces, truth
 from ..measures.references import Reference
 from ..report.choices import only_choices
 from ..report.comparison import Comparison, comparisons
-from ..report.report import tables_of
+from ..report.report import tables_across, tables_of
 from ..report.run_measures import AXES, histories
 from ..report.tables import Table
 from .page import packed, page
@@ -44,10 +45,10 @@ def study_page(store: Store, progress: bool = False) -> bytes:
             name = names[id_of(run)]
             if name not in blocks:
                 blocks[name] = packed(details(run.front, samples))
-        runs = [run_data(run, names[id_of(run)]) for run in finished_runs(comparison)]
+        runs = [run_data(run, run.front, names[id_of(run)]) for run in finished_runs(comparison)]
         shown.append(comparison_data(comparison, runs) | measures_data(comparison) | tables_data(comparison, store.definition))
-    data = {"title": summary.name, "kind": "study", "progress": progress_data(summary), "comparisons": shown}
-    return page(data, blocks)
+    head = {"title": summary.name, "kind": "study", "note": store.definition.get("note", "")}
+    return page(head | {"progress": progress_data(summary), "comparisons": shown, **across_data(found, store.definition)}, blocks)
 
 
 def _steps(found: Sequence[Comparison]) -> Iterator[Comparison]:
@@ -67,9 +68,8 @@ def finished_runs(comparison: Comparison) -> list[StoredRun]:
     return [run for runs in comparison.runs.values() for run in runs]
 
 
-def run_data(run: StoredRun, block: str) -> dict[str, Any]:
+def run_data(run: StoredRun, front: Front, block: str) -> dict[str, Any]:
     """A finished run: its labels, and its points as the solver returned them."""
-    front = run.front
     return {
         "solver": run.cell.solver,
         "number": run.number,
@@ -154,6 +154,11 @@ def tables_data(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, A
     return {"tables": [table_data(one) for one in tables_of(comparison, study).values()]}
 
 
+def across_data(found: Sequence[Comparison], study: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of several comparisons together, published ones among them."""
+    return {"tables": [table_data(one) for one in tables_across(found, study).values()]}
+
+
 def table_data(one: Table) -> dict[str, Any]:
     """A table: heads, cells as text, which columns are of words, caption and notes."""
     heads, cells, left = one.shown()
@@ -165,12 +170,17 @@ def progress_data(summary: Summary) -> dict[str, Any]:
     cells = []
     for cell, runs in summary.cells.items():
         times = [run.wall_time for run in runs if run.finished and run.wall_time]
-        finished, missing = sum(run.finished for run in runs), sum(run.status == "missing" for run in runs)
+        finished, missing = sum(run.finished for run in runs), sum(run.status == MISSING for run in runs)
         counts = {"runs": len(runs), "finished": finished, "missing": missing, "failed": len(runs) - finished - missing}
         cells.append({"labels": list(cell.labels), **counts, "time": float(np.median(times)) if times else None})
-    failed = [run for run in summary.runs if not run.finished and run.status != "missing"]
-    failures = [
+    total = {"total": len(summary.runs), "finished": summary.finished, "failed": summary.failed}
+    return {**total, "cells": cells, "failures": failures_data(summary)}
+
+
+def failures_data(summary: Summary) -> list[dict[str, str]]:
+    """Why runs failed, of which not too many are named."""
+    failed = [run for run in summary.runs if not run.finished and run.status != MISSING]
+    return [
         {"name": f"run {run.number} of {run.cell.name}", "reason": reason(run.status, run.message), "traceback": run.traceback}
         for run in failed[:MOST_FAILURES]
     ]
-    return {"total": len(summary.runs), "finished": summary.finished, "failed": len(failed), "cells": cells, "failures": failures}

@@ -1,4 +1,5 @@
-"""Exit codes of commands, the error for a wrong call, and Ctrl-C before a command begins and after it has ended."""
+"""Exit codes of commands, the error for a wrong call, and signals: Ctrl-C before a command begins and after it has ended, SIGTERM as
+Ctrl-C."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 DONE, FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
@@ -51,6 +53,29 @@ def ended_at_once(program: str) -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, previous)
+
+
+@contextmanager
+def ended_as_by_ctrl_c() -> Iterator[None]:
+    """A context in which SIGTERM does what Ctrl-C does: `kill`, `timeout` and the managers of clusters send it before they kill."""
+
+    def as_ctrl_c(number: int, frame: FrameType | None) -> None:
+        handler = signal.getsignal(signal.SIGINT)
+        if callable(handler):
+            handler(signal.SIGINT, frame)
+        else:  # a process in the background may ignore Ctrl-C; SIGTERM is to end it all the same
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            signal.raise_signal(signal.SIGTERM)
+
+    # Only where it means what it usually does, and where handlers can be set.
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, as_ctrl_c)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def deaf() -> None:

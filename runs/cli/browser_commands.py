@@ -1,8 +1,10 @@
-"""`macs report`: pages for the browser, from the command line."""
+"""`macs report` and `macs serve`: pages for the browser, from the command line."""
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from contextlib import suppress
 from pathlib import Path
 
 from .answers import DONE, WrongCall, wrong_call_on_value_error
@@ -24,6 +26,21 @@ def report(arguments: Namespace) -> int:
     except OSError as error:
         raise WrongCall(str(error)) from error
     print(f"page in {out}")
+    return DONE
+
+
+def serve(arguments: Namespace) -> int:
+    """The same page, live, from a server that only reads; until Ctrl-C."""
+    from ..browser.live.server import Server, source_of
+
+    path = find_source(arguments.source)
+    with wrong_call_on_value_error():
+        server = Server(source_of(path, arguments.trust), arguments.host, arguments.port)
+    with suppress(KeyboardInterrupt), server:
+        if not server.local:
+            print("warning: everybody on the network can read this; without --host only this machine can", file=sys.stderr)
+        print(f"{path} is shown at {server.url} until Ctrl-C", flush=True)
+        server.serve_forever()
     return DONE
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import problems
 import transcription
 from macs.front import Front
-from macs.fronts.front_plot import save_picture
+from macs.fronts.pictures.front_plot import save_front, save_picture
 from macs.fronts.pictures.style import label
 from macs.fronts.point import Point
 from macs.fronts.verification import Check
@@ -22,7 +22,6 @@ from macs.io.text import text_table
 from macs.search.settings import MESHES
 from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver
-from macs.solvers.start import STARTS
 from problems.catalogue import is_catalogued
 from problems.checks import unknown
 from transcription.inner import NAMED
@@ -31,7 +30,7 @@ from ..batch import file as studyfile
 from . import browser_commands, decide_command, study_commands
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
 from .fallback import saved
-from .inputs import check_is_front, check_picture, load_problem, read_json, same_file
+from .inputs import check_is_front, check_picture, find_start, load_problem, problem_of, read_data, read_json, same_file
 
 UNSIMULATED = "none"
 """Word for points that are not to be simulated."""
@@ -49,20 +48,22 @@ def list_all(arguments: Namespace) -> int:
 
 def solve(arguments: Namespace) -> int:
     """Search, simulate every point, print, save, draw."""
-    problem = load_problem(arguments.problem)
+    problem = load_problem(arguments.problem, **read_data(arguments.data or []))
     with wrong_call_on_value_error():
         scheme = None if arguments.transcription is None else transcription.parse(arguments.transcription)
     mesh = choose(arguments.mesh, MESHES, "kind of mesh") if arguments.mesh else None
     solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on, arguments.prefer)
     verify = None if arguments.verify == UNSIMULATED else arguments.verify or problem.default_verify
     inner = arguments.inner and choose(arguments.inner, NAMED, "inner level")
-    start = arguments.start and choose(arguments.start, STARTS, "start")
+    start = find_start(arguments.start)
     out = Path(arguments.out) if arguments.out else free_name(problem.name)
     check_target(out)
     check_is_front(out)
     check_picture(arguments.plot)
     if arguments.plot and same_file(arguments.plot, out):
         raise WrongCall(f"--plot {arguments.plot} would overwrite the front")
+    if isinstance(start, Front) and same_file(arguments.start, out):
+        raise WrongCall(f"--out {out} would overwrite the front that the search starts from")
     if arguments.checkpoint:
         check_target(arguments.checkpoint)
     if arguments.checkpoint and any(same_file(arguments.checkpoint, path) for path in (out, arguments.plot) if path):
@@ -77,6 +78,7 @@ def solve(arguments: Namespace) -> int:
                 inner=inner,
                 start=start,
                 verify=verify,
+                time_limit=arguments.time_limit,
                 checkpoint=arguments.checkpoint,
                 progress=True,
             )
@@ -108,6 +110,8 @@ def solve(arguments: Namespace) -> int:
 def show(arguments: Namespace) -> int:
     """A saved front, or one of its points."""
     check_picture(arguments.plot)
+    if arguments.costates and (arguments.point is None or not arguments.plot):
+        raise WrongCall("--costates is for the picture of a trajectory: --point I --plot FILE")
     if arguments.csv:
         check_target(arguments.csv)
         if same_file(arguments.csv, arguments.front):
@@ -119,9 +123,9 @@ def show(arguments: Namespace) -> int:
         raise WrongCall(f"point {arguments.point} has no trajectory to draw")
     print(front.table() if point is None else describe(front, point))
     if arguments.plot:
-        draw(front if point is None else point, arguments.plot)
+        draw(front if point is None else point, arguments.plot, costates=arguments.costates)
     if arguments.csv:
-        (front if point is None else front[[point.index]]).to_csv(arguments.csv)
+        (front if point is None else point).to_csv(arguments.csv)
         print(f"values in {arguments.csv}")
     return DONE
 
@@ -135,7 +139,7 @@ def verify(arguments: Namespace) -> int:
     if not arguments.problem and not front.source.address:
         raise WrongCall(f"problem '{front.source.name}' was stated in a script; give it: --problem file.py:function")
     with wrong_call_on_value_error():
-        problem = load_problem(arguments.problem) if arguments.problem else front.source.load()
+        problem = problem_of(front.source, arguments.problem) if arguments.problem else front.source.load()
         tolerance = arguments.tolerance or problem.default_verify
         front = front.replace(problem=front.source.check(problem, arguments.front))
         checks = verify_front(front, tolerance=tolerance, rtol=arguments.rtol, atol=0.1 * arguments.rtol)
@@ -225,9 +229,12 @@ def free_name(problem: str) -> Path:
 # Output
 
 
-def draw(drawn: Front | Point, path: str) -> None:
-    """Draw a front, or a point's flight."""
-    save_picture(drawn, path)
+def draw(drawn: Front | Point, path: str, costates: bool = False) -> None:
+    """Draw a front, or a point's trajectory, with or without costates."""
+    if isinstance(drawn, Front):
+        save_front(drawn, path)
+    else:
+        save_picture(drawn, path, **({"costates": True} if costates else {}))
     print(f"picture in {path}")
 
 
@@ -320,5 +327,6 @@ COMMANDS = {
     "decide": decide_command.decide,
     "study": study_commands.study,
     "report": browser_commands.report,
+    "serve": browser_commands.serve,
     "bench": bench,
 }

@@ -14,9 +14,9 @@ import numpy as np
 import transcription
 from macs.decisions import Choice, Dialogue, ReferencePoint, from_dict
 from macs.decisions.choice import degree_text
-from macs.decisions.dialogue_file import is_dialogue
+from macs.decisions.dialogue_file import is_dialogue, read
 from macs.front import Front
-from macs.fronts.front_plot import save_picture
+from macs.fronts.pictures.front_plot import save_picture
 from macs.fronts.pictures.style import label
 from macs.io.atomic import check_target
 from macs.io.text import text_table
@@ -26,7 +26,7 @@ from problems.checks import unknown
 from problems.compiled import Objective
 
 from .answers import DONE, FAILED, WrongCall, wrong_call_on_value_error
-from .inputs import check_is_front, check_picture, load_problem, read_json, same_file
+from .inputs import check_is_front, check_picture, problem_of, read_json, same_file
 
 PROMPT = "decide> "
 HELP = """\
@@ -47,7 +47,8 @@ def decide(arguments: Namespace) -> int:
     with wrong_call_on_value_error():
         _check_call(arguments)
         dialogue = _begun(arguments)
-        _ask(dialogue, arguments)
+        for _ in _asked(dialogue, arguments):
+            print(f"{shown(dialogue)}\n")
         choice = dialogue.choose()
     print(shown(dialogue))
     source = dialogue.front.source
@@ -99,16 +100,17 @@ def _check_target(kind: str, path: str, front: str, option: str) -> None:
 def _begun(arguments: Namespace) -> Dialogue:
     """The dialogue of a file, or a new one about a front."""
     path = arguments.front
-    problem = None if arguments.problem is None else load_problem(arguments.problem)
     method = None if arguments.transcription is None else transcription.parse(arguments.transcription)
     if Path(path).is_file() and is_dialogue(path):
         if method is not None:
             raise WrongCall("--transcription is for a new dialogue: this one has its own")
+        problem = None if arguments.problem is None else problem_of(read(path)[1].source, arguments.problem)
         dialogue = Dialogue.load(path, problem, arguments.trust)
         if arguments.rank_only:
             dialogue.problem = None
         return dialogue
     front = Front.load(path, trust=arguments.trust)
+    problem = None if arguments.problem is None else problem_of(front.source, arguments.problem)
     if front.source is None and problem is not None:
         raise WrongCall(f"{path} is a front of a black box: it has no problem")
     if problem is None and not arguments.rank_only:
@@ -124,8 +126,8 @@ def _own_problem(front: Front, trust: bool) -> Problem | None:
     return source.load()
 
 
-def _ask(dialogue: Dialogue, arguments: Namespace) -> None:
-    """What the options ask for."""
+def _asked(dialogue: Dialogue, arguments: Namespace) -> Iterator[None]:
+    """Ask what the options ask for; yields after each turn that another one follows."""
     if arguments.prefer:
         _prefer_file(dialogue, arguments.prefer)
     if arguments.reference:
@@ -134,7 +136,11 @@ def _ask(dialogue: Dialogue, arguments: Namespace) -> None:
         goals = dialogue.goals
         name = _name(arguments.improve, goals)
         to = None if arguments.to is None else _value(arguments.to, name, goals)
-        dialogue.improve(name, to, _assignments(",".join(arguments.giving or []), goals))
+        giving = _assignments(",".join(arguments.giving or []), goals)
+        if arguments.prefer or arguments.reference:
+            dialogue.choose()
+            yield
+        dialogue.improve(name, to, giving)
     if arguments.alternatives:
         dialogue.alternatives(arguments.alternatives)
 

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import tomllib
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import problems
+from macs.front import Front
+from macs.fronts.provenance import Source
 from macs.io.atomic import check_target, read_whole
+from macs.solvers.start import STARTS
+from problems.checks import unknown
 
-from .answers import WrongCall
+from .answers import WrongCall, wrong_call_on_value_error
 
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
+WORD = re.compile(r"[A-Za-z_][\w./-]*")
+"""A value that is text without quotes."""
 LARGEST = 2**20
 """Bytes that a JSON file of a preference may have."""
 
@@ -28,6 +37,41 @@ def load_problem(address: str, **data: Any) -> Any:
     except (Exception, SystemExit) as error:
         raise WrongCall(f"problem '{address}' does not load: {type(error).__name__}: {error}{_place(error, address)}") from error
     return problem
+
+
+def problem_of(source: Source | None, address: str) -> Any:
+    """The problem that the user names for a front or a dialogue: with the data of its own, if it is from a function of the same name."""
+    same = source is not None and source.address.rpartition(":")[2] == address.rpartition(":")[2]
+    return load_problem(address, **(dict(source.data) if source is not None and same else {}))
+
+
+def read_data(words: Sequence[str]) -> dict[str, Any]:
+    """Data of a problem: of each NAME=VALUE the name, and the value as in a TOML file, where words need no quotes."""
+    found: dict[str, Any] = {}
+    for word in words:
+        name, equals, text = (part.strip() for part in word.partition("="))
+        if not (equals and name.isidentifier() and text):
+            raise WrongCall(f"--data {word}: write NAME=VALUE")
+        if name in found:
+            raise WrongCall(f"--data {word}: {name} is given twice")
+        try:
+            values = tomllib.loads(f"value = {text}")
+        except tomllib.TOMLDecodeError:
+            values = {"value": text} if WORD.fullmatch(text) else {}
+        if list(values) != ["value"] or not isinstance(values["value"], int | float | str | list):
+            raise WrongCall(f"--data {word}: the value is no number, text, true, false or list of these, as TOML writes them")
+        found[name] = values["value"]
+    return found
+
+
+def find_start(word: str | None) -> Any:
+    """First candidates: one of `STARTS`, or the points of a front's file."""
+    if word is None or word in STARTS:
+        return word
+    if not Path(word).exists():
+        raise WrongCall(f"{unknown('start', word, STARTS)}, or the file of a front")
+    with wrong_call_on_value_error():
+        return Front.load(word)
 
 
 def _place(error: BaseException, address: str) -> str:

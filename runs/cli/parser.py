@@ -1,8 +1,8 @@
 """The parser of the command line, and the end of a call.
 
 Exit codes: 0 done; 1 failed (nothing feasible, a point that does not verify, runs missing); 2 the call was wrong: one line on stderr with
-the reason, and no file is left; 130 ended by Ctrl-C, with what there was by then. The commands themselves are in `commands`, which is only
-imported to run one: help is instant.
+the reason, and no file is left; 130 ended by Ctrl-C or SIGTERM, with what there was by then. The commands themselves are in `commands`,
+which is only imported to run one: help is instant.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from functools import partial
 from typing import Any, NoReturn
 
 from ..data.memory import is_memory_error, memory_message
-from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, deaf, ended_at_once
+from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, deaf, ended_as_by_ctrl_c, ended_at_once
 
 EPILOG = """\
 examples:
@@ -31,10 +31,11 @@ examples:
   macs study run goddard-table3 --jobs 2
   macs study status out/goddard-table3
   macs report front.nc --html front.html
+  macs serve out/goddard-table3
   macs bench inner --quick
 
 exit codes: 0 done, 1 failed (nothing feasible, a point does not verify, runs missing, a result not saved where it was to be), 2 the call
-was wrong, 130 ended by Ctrl-C"""
+was wrong, 130 ended by Ctrl-C or SIGTERM"""
 
 
 BENCH = """\
@@ -117,7 +118,8 @@ class Version(argparse.Action):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command, by default that of this process, which then ends; returns its exit code."""
     try:
-        return _answer(argv)
+        with ended_as_by_ctrl_c():
+            return _answer(argv)
     except KeyboardInterrupt:
         complain("interrupted", "macs")
         return INTERRUPTED
@@ -176,6 +178,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_decide(commands)
     _add_study(commands)
     _add_report(commands)
+    _add_serve(commands)
     _add_bench(commands)
     return parser
 
@@ -189,13 +192,19 @@ def _add(commands: argparse._SubParsersAction[Parser], name: str, text: str) -> 
 def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve = _add(commands, "solve", "search a problem for its front, simulate every point, save the front")
     solve.add_argument("problem", metavar="PROBLEM", help="a name of `macs list`, file.py:function or package.module:function")
+    solve.add_argument(
+        "--data", metavar="NAME=VALUE", action="append", help="an argument of the problem's function, such as limit=3; again for others"
+    )
     solve.add_argument("--transcription", metavar="T", help=TRANSCRIPTION)
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
+    solve.add_argument("--time-limit", metavar="S", type=_seconds, help="seconds after which the search ends with what it has found")
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
     solve.add_argument("--inner", metavar="NAME", help="the inner level: auto, propagate, ipopt, ... (default: the problem's own)")
     solve.add_argument(
-        "--start", metavar="KIND", help="first candidates: smooth about the guess, or uniform, without it (default: the problem's own)"
+        "--start",
+        metavar="KIND|FRONT.nc",
+        help="first candidates: smooth about the guess, uniform, without it, or a front's points (default: the problem's own)",
     )
     solve.add_argument("--no-refine", action="store_true", help="search without derivatives of the objectives, as the paper does")
     solve.add_argument(
@@ -222,7 +231,8 @@ def _add_show(commands: argparse._SubParsersAction[Parser]) -> None:
     show.add_argument("front", metavar="FRONT.nc")
     show.add_argument("--point", metavar="I", type=int, help="only this point, in detail; --plot draws its flight")
     show.add_argument("--plot", metavar="FILE.png", help="draw it")
-    show.add_argument("--csv", metavar="FILE", help="export objectives and decisions")
+    show.add_argument("--costates", action="store_true", help="with --point and --plot: costates and the Hamiltonian, too")
+    show.add_argument("--csv", metavar="FILE", help="a table for a spreadsheet: a row for each point, or with --point for each node")
 
 
 def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -288,6 +298,14 @@ def _add_report(commands: argparse._SubParsersAction[Parser]) -> None:
     report.add_argument("--trust", action="store_true", help=TRUST)
 
 
+def _add_serve(commands: argparse._SubParsersAction[Parser]) -> None:
+    serve = _add(commands, "serve", "the same page, live while a study runs, from a server on this machine that only reads")
+    serve.add_argument("source", metavar="DIR", help="a study's folder or name, a front, or a folder of fronts")
+    serve.add_argument("--host", metavar="ADDRESS", default="127.0.0.1", help="0.0.0.0: all can read it (default: only this machine)")
+    serve.add_argument("--port", metavar="N", type=_port, default=8642, help="0: any that is free (default: 8642)")
+    serve.add_argument("--trust", action="store_true", help=TRUST)
+
+
 def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -325,6 +343,8 @@ def _number(kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool], 
 
 _positive = partial(_number, int, "a whole number above 0", lambda value: value > 0)
 _natural = partial(_number, int, "a whole number, 0 or above", lambda value: value >= 0)
+_seconds = partial(_number, float, "a number of seconds above 0", lambda value: 0 < value < float("inf"))
+_port = partial(_number, int, "a port, from 0 to 65535", lambda value: 0 <= value <= 65535)
 _tolerance = partial(_number, float, "a number above 0", lambda value: 0 < value < float("inf"))
 
 

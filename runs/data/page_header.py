@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from datetime import date
 from os import PathLike
@@ -81,3 +81,28 @@ def digest(*files: str | PathLike[str]) -> str:
     for one in files:
         found.update(read_whole(Path(one), LARGEST))
     return found.hexdigest()
+
+
+def standing(page: Path, files_of: Callable[[str], Sequence[Path]]) -> tuple[str, bool]:
+    """The command of a page or what is wrong with it, and whether the page is as its command would make it now.
+
+    Parameters
+    ----------
+    page : Path
+    files_of : callable
+        From a command to the files that state what its page is of; raises ValueError if there is no such command.
+    """
+    try:
+        header = PageHeader.read(page.read_text(encoding="utf-8"))
+        current = digest(*files_of(header.command)) == header.digest
+    except (ValueError, OSError) as error:
+        return str(error), False
+    return f"{header.command}  ({header.date}{'' if current else ', OUT OF DATE'})", current
+
+
+def print_standing(pages: Iterable[Path], files_of: Callable[[str], Sequence[Path]]) -> bool:
+    """Print a line for each page, see `standing`; returns whether all are as their commands would make them now."""
+    found = {page.name: standing(page, files_of) for page in sorted(pages)}
+    for name, (words, _) in found.items():
+        print(f"{name}: {words}")
+    return all(good for _, good in found.values())

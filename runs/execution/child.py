@@ -17,8 +17,10 @@ from typing import Any
 
 from .task import KILLED, TIMEOUT, Outcome, Report, Task
 
-GRACE = 0.5
-"""Seconds beyond its limit in which a run that hangs writes its traceback."""
+GRACE = 10.0
+"""Seconds beyond its limit in which a run's process writes its traceback and ends itself; then it is killed."""
+LATE, TRACED = 1, b"Timeout ("
+"""Exit code of a process that `faulthandler` ends, and how the traceback begins that it writes before."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS")
 """All 1 in the process: more would round differently from machine to machine, and take the cores of other runs."""
 LAST_OUTPUT = 4000
@@ -49,18 +51,16 @@ class Child:
 
     def _attempt(self, task: Task, report: Report | None) -> Outcome:
         if not self._begin(task):
-            return self._killed(0.0)
+            return self._ended(task, 0.0)
         began = time.perf_counter()
         while True:
             left = None if task.time_limit is None else max(0.0, began + task.time_limit + GRACE - time.perf_counter())
             try:
                 message = self._inbox.get(timeout=left)
             except queue.Empty:
-                self._end()
-                seconds = time.perf_counter() - began
-                return Outcome(TIMEOUT, f"it took more than {task.time_limit:g} s", self._text(), wall_time=seconds)
+                return self._late(task, time.perf_counter() - began)
             if message is None:
-                return self._killed(time.perf_counter() - began)
+                return self._ended(task, time.perf_counter() - began)
             if message[0] == "outcome":
                 return message[1]
             if message[0] == "report" and report is not None:
@@ -101,11 +101,19 @@ class Child:
         )
         threading.Thread(target=_listen, args=(self._process.stdout, self._inbox), daemon=True).start()
 
-    def _killed(self, seconds: float) -> Outcome:
-        """The outcome of a run whose process died."""
+    def _late(self, task: Task, seconds: float) -> Outcome:
+        """The outcome of a run that took too long. The process's own clock began a little before this one's."""
+        assert task.time_limit is not None
+        self._end()
+        return Outcome(TIMEOUT, f"it took more than {task.time_limit:g} s", self._text(), wall_time=max(seconds, task.time_limit))
+
+    def _ended(self, task: Task, seconds: float) -> Outcome:
+        """The outcome of a run whose process ended before the run did."""
         if self._closed:
             return Outcome(KILLED, "the study was stopped", wall_time=seconds)
         code = self._reap()
+        if code == LATE and task.time_limit is not None and TRACED in self._output():
+            return self._late(task, seconds)
         reason = f"its process ended with exit code {code}"
         if code < 0:
             name = next((one.name for one in signal.Signals if one == -code), f"signal {-code}")
@@ -141,8 +149,12 @@ class Child:
 
     def _text(self) -> str:
         """The last output of the process."""
+        return self._output().decode(errors="replace")[-LAST_OUTPUT:].strip()
+
+    def _output(self) -> bytes:
+        """All that the process has written since its task began."""
         self._words.seek(0)
-        return self._words.read().decode(errors="replace")[-LAST_OUTPUT:].strip()
+        return self._words.read()
 
 
 def _listen(channel: Any, inbox: queue.SimpleQueue[Any]) -> None:

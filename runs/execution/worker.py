@@ -1,8 +1,8 @@
 """A process that makes one run after the other, `python -m runs.execution.worker`: tasks come in on stdin, reports and outcomes go out on
 stdout.
 
-The output of a user's problem goes to stderr, and so does the traceback of a crash or of a run that takes too long. The process ends as
-soon as stdin is closed, also in the middle of a run, and after a time without a task.
+The output of a user's problem goes to stderr, and so does the traceback of a crash or of a run that takes too long, which ends the process.
+It ends as soon as stdin is closed, too, also in the middle of a run, and after a time without a task.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import threading
 from typing import Any
 
 # Imported before the first run begins, so that the time of a run does not include it.
-import h5netcdf  # noqa: F401
+import h5py  # noqa: F401
 
 import macs.fronts.files  # noqa: F401
 
@@ -45,7 +45,7 @@ def main() -> None:
         except queue.Empty:
             return
         if task.time_limit is not None:
-            faulthandler.dump_traceback_later(task.time_limit)
+            faulthandler.dump_traceback_later(task.time_limit, exit=True)
         send("began")
         outcome = perform(task, lambda evaluations, elapsed: send("report", evaluations, elapsed))
         faulthandler.cancel_dump_traceback_later()

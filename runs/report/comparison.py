@@ -11,6 +11,7 @@ import numpy as np
 
 from macs.front import Front
 from macs.fronts.columns import by_first
+from macs.fronts.verified import feasible_when_simulated
 from macs.io.text import counted
 from macs.pareto.dominance import nondominated
 
@@ -29,7 +30,9 @@ the report says how many."""
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """The points of a run that count: all of them, or in a study that verifies those that are verified, with their simulated objectives.
+    """The points of a run that count: all of them, or in a study that verifies those that are feasible when simulated.
+
+    Their objectives are those of the simulation, so that it does not matter what the solver said of these.
 
     Attributes
     ----------
@@ -37,14 +40,15 @@ class Verified:
         The n points that count.
     ends : Ends
         Their states at the end of each phase.
-    claimed, verified : int
-        Number of points that the solver returned, and of those verified, dominated ones included.
+    claimed, verified, feasible : int
+        Number of points that the solver returned, of those verified, and of those feasible when simulated, dominated ones included.
     """
 
     front: Front
     ends: Ends
     claimed: int
     verified: int
+    feasible: int
 
     @classmethod
     def of(cls, run: StoredRun, tolerance: float | None) -> Verified:
@@ -55,19 +59,20 @@ class Verified:
         """
         front = run.front
         if tolerance is None or not len(front):
-            return cls(front, ends(front), len(front), len(front))
+            return cls(front, ends(front), len(front), len(front), len(front))
         final = run.simulated.get("ends", {})
         lengths = {len(values) for states in final.values() for values in states.values()}
         with errors_begin_with(f"the points of run {run.number} of {run.cell.name} cannot be simulated"):
             front = front if front.stats.get("verify") == tolerance else front.verify(tolerance)
             final = final if not front.dynamic or lengths == {len(front)} else record(front, tolerance)["ends"]
-        rows = np.flatnonzero(front.verified)
+        feasible = feasible_when_simulated(front, tolerance)
+        rows = np.flatnonzero(feasible)
         rows = rows[nondominated(front.simulated_F[rows])]
         rows = rows[by_first(front.simulated_F[rows] * front.signs)]
         kept = front[rows]
         kept = kept.replace(F=kept.simulated_F, violation=kept.simulated_violation, optimality=[None] * len(kept))
         places = {phase: {name: np.array(values)[rows] for name, values in states.items()} for phase, states in final.items()}
-        return cls(kept, places, len(front), int(front.verified.sum()))
+        return cls(kept, places, len(front), int(front.verified.sum()), int(feasible.sum()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +96,7 @@ class Comparison:
     stated : None, str or mapping
         The reference as the study states it.
     verifies : bool
-        Whether only verified points count.
+        Whether only points that are feasible when simulated count.
     """
 
     problem: str
@@ -138,7 +143,7 @@ class Comparison:
     def union(self) -> Reference:
         """The non-dominated points of all runs. Raises ValueError if there are none.
 
-        In a study that verifies they are the verified ones alone, and so none of foreign solvers, whose points cannot be simulated.
+        In a study that verifies only those feasible when simulated, and so none of foreign solvers, whose points cannot be simulated.
         """
         verified = [one.front for ones in self.verified.values() for one in ones]
         fronts = verified if self.verifies else self.every
@@ -151,6 +156,21 @@ class Comparison:
         source = self.known.source
         address, data = (source.address, source.data) if source is not None else ("", {})
         return look_up(given, self.problem, address, data, self.known.goals) or self.union()
+
+
+def compared(store: Store) -> dict[tuple[str, str], dict[str, list[StoredRun]]]:
+    """All runs of a study by what they are compared on, the labels of a problem and a transcription, and by solver."""
+    cells: dict[tuple[str, str], dict[str, list[StoredRun]]] = {}
+    apart: dict[str, dict[str, list[StoredRun]]] = {}
+    for run in store.runs():
+        problem, transcription, solver = run.cell.labels
+        here = apart.setdefault(problem, {}) if run.cell.apart else cells.setdefault((problem, transcription), {})
+        here.setdefault(solver, []).append(run)
+    for problem, solvers in apart.items():
+        # Solvers on terms of their own are compared with the others wherever these are; if there are none, among themselves.
+        for place in [place for place in cells if place[0] == problem] or [(problem, EACH)]:
+            cells[place] = cells.get(place, {}) | solvers
+    return cells
 
 
 def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Comparison]:
@@ -167,18 +187,8 @@ def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Com
     ValueError
         A run's points cannot be verified, see `Verified.of`.
     """
-    cells: dict[tuple[str, str], dict[str, list[StoredRun]]] = {}
-    apart: dict[str, dict[str, list[StoredRun]]] = {}
-    for run in store.runs():
-        problem, transcription, solver = run.cell.labels
-        here = apart.setdefault(problem, {}) if run.cell.apart else cells.setdefault((problem, transcription), {})
-        here.setdefault(solver, []).append(run)
-    for problem, solvers in apart.items():
-        # Solvers on terms of their own are compared with the others wherever these are; if there are none, among themselves.
-        for place in [place for place in cells if place[0] == problem] or [(problem, EACH)]:
-            cells[place] = cells.get(place, {}) | solvers
     found = []
-    for (problem, transcription), solvers in cells.items():
+    for (problem, transcription), solvers in compared(store).items():
         finished = {solver: [run for run in runs if run.finished] for solver, runs in solvers.items()}
         verified = {solver: [Verified.of(run, store.definition.get("verify")) for run in runs] for solver, runs in finished.items()}
         fronts: dict[str, Sequence[Front]] = {solver: [one.front for one in ones] for solver, ones in verified.items()}

@@ -15,7 +15,7 @@ from .tables import Cell, Column, Table, table
 
 
 def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
-    """A row for each solver: the points it claims to be feasible, and those verified. Empty if a study does not verify."""
+    """A row for each solver: the points it claims to be feasible, and those that are when simulated. Empty if a study does not verify."""
     tolerance = study.get("verify")
     if tolerance is None:
         return {}
@@ -23,26 +23,27 @@ def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
     for solver, found in comparison.verified.items():
         if not found:
             continue
-        claimed, verified = sum(one.claimed for one in found), sum(one.verified for one in found)
+        claimed, verified, feasible = (sum(getattr(one, name) for one in found) for name in ("claimed", "verified", "feasible"))
         counts = summarise([len(one.front) for one in found], larger=True)
-        share = 100.0 * verified / claimed if claimed else None
+        share = 100.0 * feasible / claimed if claimed else None
         fronts = [run.front for run in comparison.runs[solver]]
         misses = [_median([getattr(front, name) for front in fronts]) for name in ("defect", "simulated_violation")]
-        rows.append([solver, len(found), claimed, verified, share, *misses, counts.mean, counts.median])
-    heads: list[Column | str] = ["solver", "runs", "points claimed", "verified", "%"]
+        rows.append([solver, len(found), claimed, verified, feasible, share, *misses, counts.mean, counts.median])
+    heads: list[Column | str] = ["solver", "runs", "points claimed", "verified", "feasible when simulated", "%"]
     heads += [Column("median defect of a claim", digits=2), Column("median violation, simulated", digits=2)]
-    heads += ["of those verified not dominated, mean of a run", "median"]
+    heads += ["of the feasible not dominated, mean of a run", "median"]
     dynamic = any(run.front.dynamic for runs in comparison.runs.values() for run in runs)
     how = (
         f"All points were simulated by DOP853. A point is verified if nothing differs by more than {tolerance:g}: its states, in spans of "
-        "their bounds; its bounds, final values, paths and constraints, in their scales; its objectives, in ranges of its front. "
+        "their bounds; its bounds, final values, paths and constraints, in their scales; its objectives, in ranges of its front. It is "
+        "feasible when simulated if that holds of all but its objectives. "
         if dynamic
         else f"All points were evaluated again. A point is verified if nothing differs by more than {tolerance:g}: its constraints, in "
-        "their scales; its objectives, in ranges of its front. "
+        "their scales; its objectives, in ranges of its front. It is feasible if that holds of all but its objectives. "
     )
     note = how + (
-        "Indicators and published statistics are of these points alone, with the objectives found there, without those that others of "
-        "their run dominate. Figures over evaluations, iterations or time are of the points as claimed."
+        "Indicators and published statistics are of the feasible points alone, with the objectives found there, without those that "
+        "others of their run dominate. Figures over evaluations, iterations or time are of the points as claimed."
     )
     return {"claims": table(heads, rows, f"{comparison.name}: points claimed, and points verified.", [note])}
 

@@ -137,12 +137,7 @@ def report(
     sections = [str(summary), *([keys.note] if keys.note else [])]
     for comparison in _shown(found) if progress else found:
         sections += _section(comparison, study, writer, figures)
-    across: list[GoalAttainment | ChangedData | DispersedFront] = [
-        *goal_attainments(found, study),
-        *changed_data(found, study),
-        *dispersed_fronts(found, study),
-    ]
-    for part in across:
+    for part in _across(found, study):
         sections += [writer.table(name, one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
             writer.figure(name, figure)
@@ -185,6 +180,17 @@ def tables_of(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Tab
     """{name of a file: table} of a comparison, but that of the flights that stand for each front."""
     kinds = [kind for kind in TABLES if kind not in OF_FRONTS or not only_choices(comparison)]
     return {name: one for kind in kinds for name, one in kind(comparison, study).items()}
+
+
+def _across(found: Sequence[Comparison], study: Mapping[str, Any]) -> list[GoalAttainment | ChangedData | DispersedFront]:
+    """What is said of several comparisons together."""
+    return [*goal_attainments(found, study), *changed_data(found, study), *dispersed_fronts(found, study)]
+
+
+def tables_across(found: Sequence[Comparison], study: Mapping[str, Any]) -> dict[str, Table]:
+    """{name of a file: table} of several comparisons together: a goal, changed data, dispersions, and published tables beside ours."""
+    parts = [part.tables() for part in _across(found, study)]
+    return {name: one for tables in (*parts, published_tables(found, papers(study.get("paper") or []))) for name, one in tables.items()}
 
 
 def _foreign(path: str | PathLike[str], found: Sequence[Comparison]) -> Front:

@@ -214,7 +214,7 @@ def test_stages_after_the_first_stay_on_the_mesh_that_was_found() -> None:
 
 @pytest.mark.parametrize("word", ["radau:6x3", "gauss:4x3"])
 def test_other_transcriptions(word: str) -> None:
-    choice = decide(cart(), parse(word), ReferencePoint({"effort": 10.0, "time": 0.7}), ranges=RANGES)
+    choice = decide(cart(), parse(word), ReferencePoint({"effort": 10.0, "time": 0.7}), ranges=RANGES, starts=1)
     assert choice.objectives["time"] == pytest.approx(HOPED, rel=1e-6) and choice.point.optimality < 1e-6
 
 
@@ -227,7 +227,7 @@ def test_units_and_senses_do_not_matter() -> None:
     problem.maximize("savings", 1e5 - 1e3 * trip.integral(u**2))
     problem.maximize("haste", -1e-6 * trip.tf)
     ranges = Ranges({"savings": 1e5 - 187.5, "haste": -0.5e-6}, {"savings": 4e3, "haste": -4e-6})
-    choice = decide(problem, MESH, ReferencePoint({"savings": 9e4, "haste": -0.7e-6}), ranges=ranges)
+    choice = decide(problem, MESH, ReferencePoint({"savings": 9e4, "haste": -0.7e-6}), ranges=ranges, starts=1)
     assert choice.objectives["haste"] == pytest.approx(-1e-6 * HOPED, rel=1e-6)
     assert choice.value == pytest.approx((1 + 2e-4) * (HOPED - 0.7) / WIDE_T, rel=1e-6)
 
@@ -240,7 +240,7 @@ TIME, SPEED = "flight time", "horizontal speed"
 
 def goddard(preference: Preference) -> Choice:
     ranges = Ranges({TIME: 110.0, SPEED: 0.9}, {TIME: 250.0, SPEED: 0.0})
-    return decide(load("goddard"), DFET(4, 6), preference, ranges=ranges)
+    return decide(load("goddard"), DFET(4, 6), preference, ranges=ranges, starts=1)
 
 
 def speed(T: float) -> float:
@@ -261,29 +261,29 @@ def test_goddard_between_time_and_speed() -> None:
 
 def test_an_end_that_its_mesh_makes_too_good_still_is_one() -> None:
     # On this mesh the fastest ascent takes less than any real one, so that it is not verified.
-    choice = decide(load("goddard"), DFET(4, 6), WeightedSum({TIME: 1.0, SPEED: 1.0}))
+    choice = decide(load("goddard"), DFET(4, 6), WeightedSum({TIME: 1.0, SPEED: 1.0}), starts=1)
     assert choice.ranges.best[TIME] == pytest.approx(109.08, abs=0.01) and choice.ranges.worst[TIME] == pytest.approx(250.0)
 
 
 def test_peaks_of_the_user() -> None:
     # The front is (T, 16 / T^4), from 1 to 3.
-    choice = decide(shuttle(), DFET(4, 2), ReferencePoint({"time": 1.5}))
+    choice = decide(shuttle(), DFET(4, 2), ReferencePoint({"time": 1.5}), starts=1)
     T = brentq(lambda T: (T - 1.5) / 2 - (16 / T**4 - 16 / 81) / (16 - 16 / 81), 1, 3)
     assert choice.objectives["time"] == pytest.approx(T, rel=1e-5) and choice.point.optimality < 1e-6
     # The order of priority asks for a lower thrust only: it may be relaxed, as long as a rise of the peak is no gain.
-    choice = decide(shuttle(), DFET(4, 2), FuzzySatisfactory({}, ["time", "largest thrust squared"]))
+    choice = decide(shuttle(), DFET(4, 2), FuzzySatisfactory({}, ["time", "largest thrust squared"]), starts=1)
     wide = 16 - 16 / 81
     T = minimize_scalar(lambda T: 0.6 * (T - 1) / 2 + 0.4 * (16 / T**4 - 16 / 81) / wide, bounds=(1, 3), method="bounded").x
     assert choice.objectives["time"] == pytest.approx(T, rel=1e-4)
     with pytest.raises(ValueError, match="may ask for a worse value of 'largest thrust squared'"):
-        decide(shuttle(), DFET(4, 2), GoalProgramming({"largest thrust squared": Around(5.0)}))
+        decide(shuttle(), DFET(4, 2), GoalProgramming({"largest thrust squared": Around(5.0)}), starts=1)
 
 
 def test_three_objectives_and_one_that_does_not_matter() -> None:
-    choice = decide(corners(), MESH, WeightedSum({"from 0": 1.0, "from 2": 3.0}))
+    choice = decide(corners(), MESH, WeightedSum({"from 0": 1.0, "from 2": 3.0}), starts=1)
     # Squared distances from two unit vectors, one thrice as heavy: a quarter of the way from the other.
     assert list(choice.point.parameters.values()) == pytest.approx([0.25, 0.0, 0.75], abs=1e-6)
-    choice = decide(corners(), MESH, ReferencePoint({"from 0": 0.0, "from 1": 0.0, "from 2": 0.0}), ranges=_unit())
+    choice = decide(corners(), MESH, ReferencePoint({"from 0": 0.0, "from 1": 0.0, "from 2": 0.0}), ranges=_unit(), starts=1)
     assert list(choice.point.parameters.values()) == pytest.approx([1 / 3] * 3, abs=1e-5)
 
 
@@ -292,7 +292,7 @@ def _unit() -> Ranges:
 
 
 def test_where_a_state_is_limited() -> None:
-    choice = decide(bryson_denham(), DFET(8, 3), ReferencePoint({"highest": 0.1}))
+    choice = decide(bryson_denham(), DFET(8, 3), ReferencePoint({"highest": 0.1}), starts=1)
     assert choice.point.optimality < 1e-6 and choice.point.verified
     a, b = (1 - degree for degree in choice.degrees.values())
     assert a == pytest.approx(b, abs=1e-6)
@@ -302,7 +302,11 @@ def test_ranges_that_say_nothing_of_where_the_front_is() -> None:
     # The optimum is thirty times the ranges away: what the derived problem looks for is not confined to these.
     narrow = Ranges({"effort": 50.0, "time": 0.6}, {"effort": 51.0, "time": 0.61})
     choice = decide(
-        cart(), MESH, WeightedSum({"effort": 1.0, "time": 1e-9}), ranges=narrow, start=decide(cart(), MESH, _fast(), ranges=RANGES).point
+        cart(),
+        MESH,
+        WeightedSum({"effort": 1.0, "time": 1e-9}),
+        ranges=narrow,
+        start=decide(cart(), MESH, _fast(), ranges=RANGES, starts=1).point,
     )
     assert choice.objectives["effort"] == pytest.approx(12 / 64, rel=1e-6)
 
@@ -316,7 +320,7 @@ def _fast() -> Preference:
 
 @cache
 def front() -> Front:
-    return sweep(cart(), MESH, points=31)
+    return sweep(cart(), MESH, points=31, starts=1)
 
 
 @pytest.mark.parametrize("preference", [one[0] for one in KNOWN], ids=[repr(one[0]) for one in KNOWN])

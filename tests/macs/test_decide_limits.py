@@ -55,6 +55,7 @@ BAD: list[tuple[Any, dict[str, Any], str]] = [
     ((lambda x: x, TIME), {}, "needs derivatives.*preference.rank"),
     ((cart(), MESH), {}, "preference must be a Preference"),
     ((cart(), 3, TIME), {}, "transcription must be a Transcription"),
+    ((cart(), "dfet:4x6", TIME), {}, "transcription must be a Transcription.*parse makes one from a word"),
     ((cart(), MESH, TIME), {"start": 3}, "start must be a Front or a Point"),
     ((cart(), MESH, TIME), {"starts": 0}, "starts"),
     ((cart(), MESH, TIME), {"seed": -1}, "seed"),

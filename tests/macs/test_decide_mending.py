@@ -72,7 +72,7 @@ WIDE = end(6.0) - end(3.2)
 
 @cache
 def rough() -> Front:
-    return payoff(swing(), COARSE)
+    return payoff(swing(), COARSE, starts=1)
 
 
 @pytest.fixture
@@ -195,7 +195,7 @@ def test_where_only_the_objectives_could_be_kept_the_message_says_so(monkeypatch
 def test_points_that_exceed_a_limit_between_nodes_are_moved_inside(no_work) -> None:
     """Bryson and Denham's problem: a height l up to 1/6 takes an effort of 4 / (9 l)."""
     mesh = DFET(6, 3)
-    start = payoff(bryson_denham(), mesh, verify=1e-5)
+    start = payoff(bryson_denham(), mesh, verify=1e-5, starts=1)
     wanted = ReferencePoint({"highest": 0.1})
     choice = decide(bryson_denham(), wanted, start=start, verify=1e-5)
     given = decide(bryson_denham(), mesh, wanted, start=start, verify=1e-5)
@@ -211,7 +211,7 @@ def test_points_that_exceed_a_limit_between_nodes_are_moved_inside(no_work) -> N
 @pytest.mark.slow
 def test_a_skip_entry_is_refined_and_then_moved_inside_its_limits(no_work) -> None:
     mesh = DFET(6, 4)
-    start = payoff(load("skip"), mesh)
+    start = payoff(load("skip"), mesh, starts=1)
     wide = Ranges({"terminal mass": 89006.6, "terminal speed": 7802.88}, {"terminal mass": 36571.0, "terminal speed": 4805.46})
     wanted = PhysicalProgramming({"terminal mass": Larger.even(89000, 64000), "terminal speed": Larger.even(7800, 5500)})
     choice = decide(load("skip"), wanted, ranges=wide, start=start)
@@ -224,7 +224,10 @@ def test_a_skip_entry_is_refined_and_then_moved_inside_its_limits(no_work) -> No
 def test_objectives_are_judged_by_the_ranges_of_what_is_known() -> None:
     """Off by a twentieth of its range is nothing in an objective of a thousand."""
     problem = swing(1000.0)
-    known, vague = payoff(problem), decide(problem, COARSE, ReferencePoint({"time": 4.5}), start=payoff(problem, COARSE)).point
+    known, vague = (
+        payoff(problem, starts=1),
+        decide(problem, COARSE, ReferencePoint({"time": 4.5}), start=payoff(problem, COARSE, starts=1)).point,
+    )
     assert known.verified.all() and np.ptp(known.F[:, 0]) == pytest.approx(WIDE, rel=1e-2)
     off = abs(vague.objectives["end"] - vague.simulated["end"])
     assert vague.defect < 6e-2 and 6e-2 * WIDE < off < 1e-3 * 1000

@@ -38,7 +38,7 @@ CLASSES = {"effort": Smaller(5, 10, 15, 25, 50), "time": Smaller(0.6, 0.8, 1.0, 
 
 @cache
 def front() -> Front:
-    return sweep(cart(), MESH, points=9)
+    return sweep(cart(), MESH, points=9, starts=1)
 
 
 def begun(**more: Any) -> Dialogue:
@@ -319,7 +319,7 @@ def test_the_history_is_drawn() -> None:
 
 
 def test_a_front_that_was_not_simulated_is_saved_with_points_that_were(tmp_path: Path) -> None:
-    bare = sweep(cart(), MESH, points=5, verify=None)
+    bare = sweep(cart(), MESH, points=5, verify=None, starts=1)
     dialogue, path = Dialogue(bare, cart(), MESH), tmp_path / "choice.json"
     dialogue.prefer(HOPED)
     assert dialogue.choose().point.verified and not bare.was_simulated.any()
@@ -329,7 +329,7 @@ def test_a_front_that_was_not_simulated_is_saved_with_points_that_were(tmp_path:
 
 
 def test_more_objectives() -> None:
-    front = sweep(corners(), MESH, points=15)
+    front = sweep(corners(), MESH, points=15, starts=1)
     dialogue = Dialogue(front, corners(), MESH)
     dialogue.choose()
     now = dialogue.choose().objectives

@@ -202,10 +202,19 @@ def test_a_table_has_a_row_for_each_point_and_warnings():
     assert lines[0] == "two legs: 5 points, DFET(elements=3, order=4), MACS, 1 000 evaluations, seed 7, 1.2 s"
     assert "min [s]" in lines[3] and "max [km]" in lines[3] and "bound" in lines[2] and "note" in lines[2]
     assert len([line for line in lines if "converged" in line]) == 5
+    assert "The points were not simulated: front.verify() does that" in lines[-2]
     assert "4 of 5 points leave their bounds between nodes: u of point 4 by 0.5" in lines[-1]
     assert max(map(len, lines)) < 140 and all(line == line.rstrip() for line in lines)
     with pytest.raises(ValueError, match="'bound' has 2 entries"):
         front.table({"bound": [0, 1]})
+
+
+def test_tables_say_which_objectives_are_not_in_conflict():
+    front = black_box(4)
+    assert "conflict" not in front.table()
+    same = front.replace(F=np.column_stack([front.F[:, 0], np.full(len(front), 2.9) + 1e-9 * np.arange(len(front))]))
+    assert f"'{same.names[1]}' is the same at all points: it is not in conflict with the other objectives." in same.table()
+    assert "No other point was found that is better in any objective." in black_box(1).table()
 
 
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=6))
@@ -217,6 +226,9 @@ def test_any_number_can_be_shown(values):
 def test_numbers_show_what_differs():
     assert numbers([1000.00001, 1000.00002]) == ["1000.00001000", "1000.00002000"]
     assert numbers([109.09461, 250]) == ["109.095", "250.000"]
+    assert numbers([5.35104, 67069.2, 835267.4]) == ["5.3510", "67069     ", "835267     "], "points below each other"
+    assert numbers([0.5, 1e-5, 1000]) == ["0.50000", "0.00   ", "1000.00   "]
+    assert numbers([np.inf, 5.35104, np.nan]) == ["inf", "5.35104", "nan"], "what is no number has no digits"
     assert numbers([-0.0, 0.0]) == ["0.00000", "0.00000"]
     assert numbers([1e-9, 2e-9]) == ["1.00000e-09", "2.00000e-09"]
 

@@ -37,7 +37,7 @@ def certificates(front: Front) -> np.ndarray:
 
 @cache
 def goddard(method: str = "pascoletti-serafini") -> Front:
-    return sweep(load("goddard"), DFET(4, 6), points=10, method=method)
+    return sweep(load("goddard"), DFET(4, 6), points=10, method=method, starts=1)
 
 
 # Against the truth
@@ -75,15 +75,15 @@ def test_both_methods_lie_on_one_curve() -> None:
 
 def test_a_point_found_by_limits_is_found_by_descent() -> None:
     problem, mesh = load("orbit_rise"), DFET(8, 2)
-    limited = sweep(problem, mesh, points=5, method="epsilon")
-    fine = sweep(problem, mesh, points=101, start=limited)
+    limited = sweep(problem, mesh, points=5, method="epsilon", starts=1)
+    fine = sweep(problem, mesh, points=101, start=limited, starts=1)
     assert distances(limited, fine.objectives).max() < 1e-4
     assert fine.stats["failures"] == {} and len(fine) == 101
 
 
 @pytest.mark.parametrize("name", ["orbit_rise", "orbit_rise_full"])
 def test_orbit_rise_is_what_its_mesh_can_be(name: str) -> None:
-    front = sweep(load(name), DFET(30, 1), points=10)
+    front = sweep(load(name), DFET(30, 1), points=10, starts=1)
     assert len(front) == 10 and certificates(front).max() < 1e-6
     miss = distances(front, orbit_reference())
     assert miss.mean() < 5e-5 and miss.max() < 1e-4
@@ -98,18 +98,18 @@ def test_two_wells_and_their_multipliers() -> None:
 
 
 def test_three_objectives_fill_their_triangle() -> None:
-    front = sweep(corners(), MESH, points=15)
+    front = sweep(corners(), MESH, points=15, starts=1)
     p = np.array([list(point.parameters.values()) for point in front])
     assert len(front) == 15 and p.sum(axis=1) == pytest.approx(1, abs=1e-6) and p.min() > -1e-6
     # The lattice of four divisions.
     assert 4 * p == pytest.approx(np.round(4 * p), abs=1e-2)
-    limited = sweep(corners(), MESH, points=12, method="epsilon")
+    limited = sweep(corners(), MESH, points=12, method="epsilon", starts=1)
     p = np.array([list(point.parameters.values()) for point in limited])
     assert 3 < len(limited) <= 12 and p.sum(axis=1) == pytest.approx(1, abs=1e-6) and p.min() > -1e-6
 
 
 def test_a_front_of_peaks() -> None:
-    front = sweep(shuttle(), MESH, points=5)
+    front = sweep(shuttle(), MESH, points=5, starts=1)
     time, thrust = front.objectives.T
     assert len(front) == 5 and thrust == pytest.approx(16 / time**4, rel=1e-6) and certificates(front).max() < 1e-6
 
@@ -125,7 +125,7 @@ def test_a_control_that_goes_round() -> None:
 
 
 def test_payoff_is_lexicographic_in_the_declared_order() -> None:
-    ends = payoff(load("orbit_rise"), DFET(30, 1))
+    ends = payoff(load("orbit_rise"), DFET(30, 1), starts=1)
     assert len(ends) == 2 and list(ends.status) == ["converged"] * 2
     # At the least time any steering is optimal for the time; the second stage makes the best of it.
     assert ends.objectives[0] == pytest.approx([20, -0.28345966], abs=1e-6)
@@ -147,7 +147,7 @@ def test_payoff_keeps_the_declared_order_where_the_first_is_maximised() -> None:
 
 def test_ends_of_smooth_fronts_are_not_rounded_off() -> None:
     # Where a front is steep, a slack of 1e-9 in one objective would be 3e-5 in the other.
-    ends = payoff(slide(), MESH)
+    ends = payoff(slide(), MESH, starts=1)
     assert ends.objectives == pytest.approx(np.array([[0, 1], [0.5, 0]]), abs=1e-6)
 
 
@@ -156,7 +156,7 @@ def test_three_ends() -> None:
 
 
 def test_optimize_takes_one_objective() -> None:
-    point = optimize(load("goddard"), DFET(4, 6), objective="horizontal speed")
+    point = optimize(load("goddard"), DFET(4, 6), objective="horizontal speed", starts=1)
     assert point.objectives["horizontal speed"] == pytest.approx(0.903889755, abs=1e-6)
     assert point.status == "converged" and point.optimality < 1e-6 and point.simulate().max_defect < 1e-5
     assert optimize(two_wells(), MESH).objectives["from left"] == pytest.approx(0, abs=1e-9)
@@ -191,16 +191,16 @@ def test_the_same_seed_gives_the_same_bits_and_the_costs() -> None:
     assert np.array_equal(one.decision, two.decision) and one.stats["seed"] == 3
     assert one.stats["gradient_solves"] == two.stats["gradient_solves"] >= 2 * (2 * 2 + 2)
     assert one.stats["inner_iterations"] > one.stats["gradient_solves"] and one.stats["wall_time"] > 0 and one.stats["reproducible"]
-    assert isinstance(sweep(shuttle(), MESH, points=3, seed=None).stats["seed"], int)
+    assert isinstance(sweep(shuttle(), MESH, points=3, starts=1, seed=None).stats["seed"], int)
 
 
 def test_a_front_is_a_start_for_another() -> None:
-    begun = sweep(load("goddard"), DFET(4, 6), points=6, start=goddard())
+    begun = sweep(load("goddard"), DFET(4, 6), points=6, start=goddard(), starts=1)
     assert len(begun) == 6 and begun.stats["inner_iterations"] < goddard().stats["inner_iterations"]
 
 
 def test_certificates_are_saved(tmp_path) -> None:
-    front = sweep(two_wells(), MESH, points=3)
+    front = sweep(two_wells(), MESH, points=3, starts=1)
     front.save(tmp_path / "front.nc")
     assert certificates(Front.load(tmp_path / "front.nc")) == pytest.approx(certificates(front))
 
@@ -216,11 +216,11 @@ def unreachable() -> Problem:
 
 
 def test_the_message_if_nothing_converges() -> None:
-    point = optimize(unreachable(), MESH)
+    point = optimize(unreachable(), MESH, starts=2)
     assert point.status in ("infeasible", "failed") and point.violation > 1e-3
-    ends = payoff(unreachable(), MESH)
+    ends = payoff(unreachable(), MESH, starts=2)
     assert len(ends) == 2 and "converged" not in ends.status and sum(ends.stats["failures"].values()) >= 2
-    front = sweep(unreachable(), MESH, points=5)
+    front = sweep(unreachable(), MESH, points=5, starts=2)
     assert len(front) == 0 and "no solve converged" in front.message and "too far" in front.message
     assert front.closest is not None and front.closest.violation > 1e-3
 
@@ -232,7 +232,7 @@ def test_objectives_that_are_in_no_conflict_have_one_point() -> None:
     run.dynamics(x=u)
     problem.minimize("effort", run.integral(u**2))
     problem.minimize("path", run.integral(x**2))
-    front = sweep(problem, MESH, points=6)
+    front = sweep(problem, MESH, points=6, starts=1)
     assert len(front) == 1 and np.allclose(front.F, 0, atol=1e-9) and "dominated or equal" in front.message
 
 

@@ -24,7 +24,7 @@ from transcription import parse
 
 @pytest.fixture(scope="module")
 def ascents() -> Front:
-    return sweep(load("goddard"), parse("dfet:6x6"), points=9)
+    return sweep(load("goddard"), parse("dfet:6x6"), points=9, starts=1)
 
 
 def test_weights_are_the_slope_of_the_front(ascents):
@@ -66,7 +66,7 @@ def test_costates_jump_where_edges_have_moved_to():
     u = move.control("u", bounds=(-20, 20))
     move.dynamics(x=v, v=u)
     problem.minimize("effort", move.integral(u**2 / 2))
-    point = optimize(problem)
+    point = optimize(problem, starts=1)
     mesh, edges = point.transcription["settings"]["mesh"]["move"], point.trajectory["move"].state.edges
     assert max(abs(edges[k] - mesh["edges"][k]) for k in mesh["moving"]) > 0.05, "else this test says nothing"
     costates, flown = point.costates["move"], point.trajectory["move"]
@@ -78,7 +78,7 @@ def test_costates_jump_where_edges_have_moved_to():
 
 def test_the_optimum_of_one_objective_has_weight_one():
     """Even at the quickest ascent, where each control is on a bound and other weights would do as well."""
-    point = optimize(load("goddard"), parse("dfet:6x4"))
+    point = optimize(load("goddard"), parse("dfet:6x4"), starts=1)
     assert point.weights == {"flight time": pytest.approx(1.0), "horizontal speed": 0.0}
 
 
@@ -89,7 +89,7 @@ def test_points_of_a_search_have_them():
 
 
 def refined(name: str):
-    return Front.of(optimize(load(f"standard/{name}")).alone()).refine_mesh()[0]
+    return Front.of(optimize(load(f"standard/{name}"), starts=1).alone()).refine_mesh()[0]
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_where_nothing_is_feasible_there_are_none():
     u = run.control("u", bounds=(-1, 1))
     run.dynamics(x=u + 0 * x)
     problem.minimize("effort", run.integral(u**2))
-    point = optimize(problem, parse("dfet:4x3"))
+    point = optimize(problem, parse("dfet:4x3"), starts=1)
     assert point.status != "converged" and point.costates is None
     assert point.plot().shape == (2,)
 
@@ -241,7 +241,7 @@ def test_a_state_may_be_called_hamiltonian(tmp_path):
     u = run.control("u", bounds=(-9, 9))
     run.dynamics(**{"hamiltonian": u, "costate of x": x + 0 * y})
     problem.minimize("effort", run.integral(u**2))
-    front = Front.of(optimize(problem, parse("dfet:2x3")).alone())
+    front = Front.of(optimize(problem, parse("dfet:2x3"), starts=1).alone())
     front.save(tmp_path / "front.nc")
     loaded = Front.load(tmp_path / "front.nc")
     assert same(front[0], loaded[0])
@@ -250,15 +250,15 @@ def test_a_state_may_be_called_hamiltonian(tmp_path):
 
 
 def test_a_mesh_of_its_own_and_two_meshes_in_one_file(tmp_path):
-    fine = optimize(load("standard/car")).alone()
-    coarse = optimize(load("standard/car"), parse("multiple-shooting:12")).alone()
+    fine = optimize(load("standard/car"), starts=1).alone()
+    coarse = optimize(load("standard/car"), parse("multiple-shooting:12"), starts=1).alone()
     front = Front.concatenate([fine, coarse])
     front.save(tmp_path / "front.nc")
     assert all(same(*two) for two in zip(front, Front.load(tmp_path / "front.nc"), strict=True))
 
 
 def test_a_picture_shows_them_below(ascents):
-    axes = ascents[3].plot()
+    axes = ascents[3].plot(costates=True)
     names, units = zip(*(" ".join(ax.get_ylabel().split()).split(" [") for ax in axes[5:]), strict=True)
     assert names == ("costate of x", "costate of vx", "costate of y", "costate of vy", "Hamiltonian")
     assert units[0] == units[2] == "per km]" and units[4] == "per s]"
@@ -267,7 +267,7 @@ def test_a_picture_shows_them_below(ascents):
     # A costate that is zero is drawn as such, not its round-off.
     low, high = axes[5].get_ylim()
     assert high - low > 1e-5
-    assert len(ascents.replace(costates=[None] * len(ascents))[3].plot()) == 5
+    assert len(ascents.replace(costates=[None] * len(ascents))[3].plot(costates=True)) == 5
 
 
 def test_the_command_line_names_the_weights(ascents, tmp_path, capsys):

@@ -317,7 +317,7 @@ def test_controls_that_switch_at_moving_edges():
 
 @pytest.fixture(scope="module")
 def ascents() -> Front:
-    return sweep(load("goddard"), parse("dfet:6x6"), points=12, method="epsilon")
+    return sweep(load("goddard"), parse("dfet:6x6"), points=12, method="epsilon", starts=1)
 
 
 def test_rates_are_the_slope_of_the_front_in_closed_form(ascents):
@@ -507,7 +507,7 @@ def test_weights_that_are_zero():
 
 def test_a_file_has_the_rates_and_says_what_the_matrix_needs(tmp_path):
     problem = carts()
-    front = sweep(problem, parse(MESH), points=10, verify=None)
+    front = sweep(problem, parse(MESH), points=10, verify=None, starts=1)
     front.save(tmp_path / "front.nc")
     loaded = Front.load(tmp_path / "front.nc")
     for point, other in zip(front, loaded, strict=True):
@@ -530,7 +530,7 @@ def test_what_has_no_trade_offs(ascents):
     with pytest.raises(ValueError, match="black box"):
         trade_offs(black_box()[0])
     with pytest.raises(ValueError, match="one objective, 'time'"):
-        trade_offs(optimize(load("standard/car"), parse("dfet:4x3"), verify=None))
+        trade_offs(optimize(load("standard/car"), parse("dfet:4x3"), verify=None, starts=1))
     with pytest.raises(ValueError, match="no objective 'speed'; there are flight time, horizontal speed"):
         trade_offs(ascents[3]).rate("speed", 0)
     for wrong in (2, -1, True):
@@ -584,7 +584,7 @@ def test_pictures_of_fronts(ascents):
     above, below = plot_rates(ascents)
     assert below.get_xlabel() == "\N{LEFTWARDS ARROW} flight time [s]" and below.get_yscale() == "log"
     assert len(above.lines) == len(ascents), "a dash for each point"
-    front = sweep(carts(), parse(MESH), points=15, verify=None)
+    front = sweep(carts(), parse(MESH), points=15, verify=None, starts=1)
     axes = plot_rates(front)
     assert len(axes) == 3
     axes[0].figure.draw_without_rendering()

@@ -175,6 +175,15 @@ def test_plain_numbers_are_expressions():
     phase.dynamics(height=np.float64(1))
     phase.path("load", ca.DM(0.5), upper=1)
     problem.constraint("fuel", 3, lower=2)
-    problem.minimize("nothing", 1)
     problem.minimize("time", phase.final(2) + phase.integral(1))
     problem.compile()
+
+
+def test_an_objective_that_depends_on_nothing_may_only_be_the_only_one():
+    problem, phase = bare()
+    x = phase.state("height", bounds=(0, 1))
+    phase.dynamics(height=np.float64(1))
+    problem.minimize("nothing", 0 * x + 3)
+    problem.compile()
+    problem.minimize("time", phase.final(x))
+    refused(problem.compile, "nothing", "constant")

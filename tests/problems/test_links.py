@@ -62,6 +62,18 @@ def test_a_link_stated_before_the_states_still_joins_them():
     assert problem.compile().links[0].states == ("x",)
 
 
+def test_a_jump_of_a_state_that_a_link_continues_is_refused_by_name():
+    problem, legs = relay()
+    problem.link(legs[0], legs[1])
+    problem.constraint("drop", legs[0].final(legs[0]["x"]) - legs[1].initial(legs[1]["x"]), lower=2.0)
+    refused(problem.compile, "drop", "link", "at least 2")
+    problem, legs = relay()
+    problem.link(legs[0], legs[1], states=[])
+    problem.constraint("drop", legs[0].final(legs[0]["x"]) - legs[1].initial(legs[1]["x"]), lower=2.0)
+    problem.constraint("as before", legs[0].final(legs[0]["x"]) - legs[0].final(legs[0]["x"]), upper=0.0)
+    problem.compile()
+
+
 def test_links_that_leave_nothing_are_refused():
     problem, legs = relay(2)
     third = problem.phase("late", t0=11, tf=12)

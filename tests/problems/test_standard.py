@@ -117,5 +117,5 @@ def test_the_published_optimum_is_found_and_flies(name, mesh):
 
 def test_local_optima_are_found_where_they_are_published():
     record = published("f8")[0]
-    point = optimize(load("standard/f8"), parse("dfet:20x3"), verify=None)
+    point = optimize(load("standard/f8"), parse("dfet:20x3"), verify=None, starts=1)
     assert min(abs(point.objectives["time"] - other) for other in (record.value, *record.local)) < 5e-3

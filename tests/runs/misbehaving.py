@@ -77,6 +77,18 @@ class Slow(Plain):
 
 
 @dataclass(frozen=True)
+class Gated(Plain):
+    """Waits half way until there is a file."""
+
+    gate: str = ""
+
+    def advance(self, state: Any, evaluator: Any, budget: int) -> None:
+        while evaluator.counts.evaluations >= budget // 2 and not Path(self.gate).exists():
+            time.sleep(0.02)
+        super().advance(state, evaluator, budget)
+
+
+@dataclass(frozen=True)
 class Faltering(Plain):
     """Crashes half way as long as there is a file, and deletes that; notes in another how much was evaluated before each iteration."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,7 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from misbehaving import Crashing, Plain, glide
-from synthetic_fronts import black_box, empty, flights, marked
+from synthetic_fronts import black_box, empty, flights, marked, with_optional_phase
+from test_study import Inline
 
 from macs import optimize
 from problems import load
@@ -104,6 +106,30 @@ def test_costates_are_those_of_the_point_and_have_units():
         assert [one["v"][0], one["v"][-1]] == pytest.approx(exact[name][[0, -1]], rel=1e-5, abs=1e-9)
 
 
+@pytest.mark.parametrize("length", [-3.7e-6, 0.0, 2e-6])
+def test_a_phase_without_length_has_no_costates_and_does_not_stretch_those_of_others(length):
+    trajectory, costates = with_optional_phase(length)
+    climb, coast = curves(trajectory, costates, 400)
+    assert (climb["lasts"], coast["lasts"]) == (True, False)
+    assert {one["kind"] for one in coast["quantities"]} == {"state"}
+    adjoint = [one for one in climb["quantities"] if one["kind"] in ("costate", "hamiltonian")]
+    assert [one["name"] for one in adjoint] == ["h", "v", "Hamiltonian"]
+    assert max(one["least"] for one in adjoint) < 1.0
+    whole = curves(*with_optional_phase(1.0), 400)[1]
+    assert whole["lasts"] and {one["kind"] for one in whole["quantities"]} == {"state", "costate", "hamiltonian"}
+
+
+def test_round_off_of_a_constant_state_does_not_stretch_its_costate():
+    """Of a mass that does not change, say."""
+    trajectory, costates = with_optional_phase(1.0)
+    climb, coast = trajectory.phases
+    constant = coast.states.copy()
+    constant[:] = 5.0
+    constant[-1] += 1e-15
+    still = replace(trajectory, phases=(climb, replace(coast, states=constant)))
+    assert max(one["least"] for one in curves(still, costates, 400)[1]["quantities"]) < 1e5
+
+
 def test_a_page_loads_nothing_and_stays_small():
     content = front_page(flights(10))
     assert len(content) < 6_000_000
@@ -167,7 +193,7 @@ def test_many_points_have_fewer_samples():
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("browser") / "out"
     solvers = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
-    Study("gliders", problems=glide(), solvers=solvers, evaluations=60, runs=2, seed=1).run(out)
+    Study("gliders", problems=glide(), solvers=solvers, evaluations=60, runs=2, seed=1).run(out, executor=Inline())
     return out
 
 
@@ -185,6 +211,16 @@ def test_the_page_of_a_study_has_its_runs_measures_tables_and_failures(folder):
     assert "the root of all evil" in progress["failures"][0]["reason"] and "Traceback" in progress["failures"][0]["traceback"]
     assert set(comparison["attainment"]) <= {"one", "other", "broken"} and comparison["convergence"]
     assert any("points claimed" in one["caption"] for one in comparison["tables"])
+    assert reader.data["tables"] == []
+
+
+def test_the_page_of_a_study_has_published_tables_and_its_note(folder):
+    store = Store.open(folder, trust=True)
+    (problem,) = {run.cell.problem for run in store.runs()}
+    paper = {"of": "indicators", "source": "A. Author, Table I", "rows": [{"problem": problem, "by": "the paper", "gd_mean": 0.5}]}
+    stated = Store(store.path, {**store.definition, "paper": [paper], "note": "Two of each."}, trust=True)
+    data = Reader(study_page(stated)).data
+    assert data["note"] == "Two of each." and any("A. Author" in one["caption"] for one in data["tables"])
 
 
 def test_the_command_writes_pages_and_refuses_what_is_wrong(folder, tmp_path, capsys):

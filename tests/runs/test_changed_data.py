@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from misbehaving import Plain, glide
+from test_study import Inline
 
 from macs import NSGA2, Front
 from problems import Problem
@@ -63,7 +64,7 @@ def folder(tmp_path_factory) -> Path:
     place = tmp_path_factory.mktemp("carts")
     (place / "cart.py").write_text(CART, encoding="utf-8")
     (place / "carts.toml").write_text(STUDY, encoding="utf-8")
-    Study.load(place / "carts.toml", trust=True).run(place / "out")
+    Study.load(place / "carts.toml", trust=True).run(place / "out", executor=Inline())
     return place / "out"
 
 
@@ -145,7 +146,7 @@ def test_of_many_objectives_a_row_for_each_data(tmp_path):
         inner="propagate",
         nominal="2",
     )
-    study.run(tmp_path / "out")
+    study.run(tmp_path / "out", executor=Inline())
     (found,) = changed_data(comparisons(Store.open(tmp_path / "out", trust=True), {}), {"nominal": "2"})
     figure = changed_figure(found.changes[0])
     assert [ax.get_title("left") for ax in figure.axes] == ["4"] * 3 + ["5"] * 3
@@ -174,7 +175,7 @@ def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_p
     def told(**problems: Problem) -> str:
         study = Study("gliders", problems=problems, solvers=Plain(), evaluations=20, runs=1, seed=1, nominal="one")
         out = tmp_path / "-".join(problems)
-        study.run(out)
+        study.run(out, executor=Inline())
         (found,) = changed_data(comparisons(Store.open(out, trust=True), {}), {"nominal": "one"})
         assert found.figures() == {} and "changed-data-points" not in found.tables()
         return found.tables()["changed-data"].text()

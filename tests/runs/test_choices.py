@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from misbehaving import glide
+from test_study import Inline
 
 from macs.preferences import FuzzySatisfactory
 from runs import Study
@@ -48,7 +49,7 @@ def study(**more) -> Study:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("chosen") / "out"
-    assert study().run(out).finished == 1
+    assert study().run(out, executor=Inline()).finished == 1
     return out
 
 

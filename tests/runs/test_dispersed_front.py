@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_study import Inline
 
 from problems import load
 from problems.cases.aerocapture import coupled
@@ -41,7 +42,7 @@ def few():
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("dispersed") / "out"
-    study().run(out)
+    study().run(out, executor=Inline())
     return out
 
 

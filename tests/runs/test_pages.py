@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from misbehaving import Plain
+from test_study import Inline
 
 from macs import MACS, NSGA2
 from macs.front import Front
@@ -43,7 +44,7 @@ def place(tmp_path_factory) -> Path:
     """A study file, and its finished runs in `out`."""
     base = tmp_path_factory.mktemp("pages")
     (base / "small.toml").write_text(TOML)
-    assert Study.load(base / "small.toml").run(base / "out").finished == 6
+    assert Study.load(base / "small.toml").run(base / "out", executor=Inline()).finished == 6
     return base
 
 
@@ -123,7 +124,7 @@ def test_work_on_transcriptions_of_different_kinds_is_compared_by_instructions(t
         runs=1,
         seed=1,
     )
-    study.run(tmp_path / "out")
+    study.run(tmp_path / "out", executor=Inline())
     [comparison] = comparisons(Store.open(tmp_path / "out"), {})
     charge = Charge.of(comparison)
     assert charge is not None
@@ -137,11 +138,11 @@ def test_work_on_transcriptions_of_different_kinds_is_compared_by_instructions(t
     assert charge(polished.cell, stats) == pytest.approx(60 + more, rel=1e-2)
 
 
-def test_unions_hold_verified_points_only(place, tmp_path):
+def test_unions_hold_only_what_a_simulation_found(place, tmp_path):
     shutil.copytree(place / "out", tmp_path / "out")
     store = Store.open(tmp_path / "out")
     [before] = comparisons(store, {})
-    # A point that is better than all, and that a simulation did not confirm, joins a run.
+    # A point that claims to be better than all, which a simulation does not find, joins a run.
     run = before.runs["plain"][0]
     best = np.min([front.F.min(axis=0) for front in before.every if len(front)], axis=0) - 1.0
     false = run.front[[0]].replace(F=best[None], verified=np.array([False]))
@@ -152,7 +153,8 @@ def test_unions_hold_verified_points_only(place, tmp_path):
     assert after.verified["plain"][0].claimed == before.verified["plain"][0].claimed + 1
     np.testing.assert_array_equal(after.union().front.F, before.union().front.F)
     # Confirmed, it would be the whole union.
-    joined.replace(verified=np.ones(len(joined), dtype=bool), simulated_F=joined.F).save(run.path)
+    nothing = np.zeros(len(joined))
+    joined.replace(verified=nothing == 0, defect=nothing, simulated_violation=nothing, simulated_F=joined.F).save(run.path)
     [confirmed] = comparisons(Store.open(tmp_path / "out"), {})
     np.testing.assert_array_equal(confirmed.union().front.F, best[None])
     # The same by a program of which nothing can be simulated.

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from misbehaving import Crashing, Plain, glide
+from test_study import Inline
 
 from macs import Front
 from macs.gradient_solvers import Payoff, Sweep
@@ -42,7 +43,7 @@ def study(**more) -> Study:
 def folder(tmp_path_factory) -> Path:
     """Three runs of three solvers each: one of the first is missing, a front of the second is damaged, all of the third crashed."""
     out = tmp_path_factory.mktemp("gliders") / "out"
-    study().run(out)
+    study().run(out, executor=Inline())
     store = Store.open(out)
     one, other, _ = store.cells
     lost = store.run(one, 2).path
@@ -57,14 +58,16 @@ def told(folder) -> str:
     return str(study().report(folder))
 
 
-@pytest.mark.parametrize("solvers", [{"ends": Payoff()}, {"front": Sweep(points=3)}])
+@pytest.mark.parametrize(
+    "solvers", [{"ends": Payoff(starts=1)}, pytest.param({"front": Sweep(points=3, starts=1)}, marks=pytest.mark.slow)]
+)
 def test_gradient_tools_alone_need_no_ends_and_no_figures_over_evaluations(solvers, tmp_path, monkeypatch):
     def unasked(*_):
         raise AssertionError("ends that are known, or not needed, were sought")
 
     monkeypatch.setattr("runs.report.flights.payoff", unasked)
     ours = study(solvers=solvers, runs=1, paper=[])
-    ours.run(tmp_path / "out")
+    ours.run(tmp_path / "out", executor=Inline())
     told = str(ours.report(tmp_path / "out"))
     assert ("distance alone" in told) == ("ends" in solvers)
     names = {path.name for path in (tmp_path / "out" / "report").iterdir()}

@@ -121,7 +121,8 @@ def test_a_wrong_call_is_one_line(here, capsys, call, words):
     assert code == 2 and words in said.err and said.err.count("\n") == 1 and not (here / "out").exists()
 
 
-def test_ctrl_c_says_how_to_go_on(here):
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_ctrl_c_and_kill_say_how_to_go_on(here, number):
     (here / "gliders.toml").write_text(TOML.replace("60", "2_000_000"), encoding="utf-8")
     call = [sys.executable, "-m", "runs.cli", "study", "run", "gliders.toml", "--trust"]
     # A background job may have been told to ignore it, and its children with it.
@@ -130,7 +131,7 @@ def test_ctrl_c_says_how_to_go_on(here):
     while not (here / "out/gliders/study.json").exists():
         time.sleep(0.05)
     time.sleep(0.5)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(getattr(signal, number))
     said = process.communicate(timeout=20)[1]
     assert process.returncode == 130 and "the same command goes on" in said and "Traceback" not in said
 
@@ -140,7 +141,7 @@ def test_studies_are_listed_and_reproduce_the_published_table(capsys):
     said = capsys.readouterr().out
     for name in ("goddard-table3", "orbit-table3", "orbit-full-table3"):
         study = Study.load(name)
-        assert name in said and study.name == name and study.runs == 10 and len(study.cells) == 5
+        assert name in said and study.name == name and study.runs == 10 and len(study.cells) == 6
         (paper,) = study.paper[0]["rows"]
         assert paper["problem"] == study.cells[0].problem
         # Table III.

@@ -231,7 +231,7 @@ def test_a_transcription_of_its_own_may_be_a_label_of_the_study(tmp_path):
     ours = study(transcriptions=words, terms=given)
     assert [cell.labels[1:] for cell in ours.cells] == [("coarse", "macs"), ("fine", "nsga2")]
     assert ours.cells[1].details["transcription"] == words["fine"].to_dict() and all(cell.apart for cell in ours.cells)
-    ours.run(tmp_path / "out")
+    ours.run(tmp_path / "out", executor=Inline())
     [comparison] = comparisons(Store.open(tmp_path / "out"), {})
     assert list(comparison.fronts) == ["macs", "nsga2"] and comparison.place("nsga2") == "fine"
     with pytest.raises(ValueError, match="transcription 'finer'"):

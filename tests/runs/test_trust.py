@@ -173,7 +173,7 @@ def test_damaged_records_are_refused_or_the_same(made, tmp_path):
     expected, rng = numbers(Store.open(out)), random.Random(1)
     files = [out / "study.json", *sorted(out.glob("*/*.json"))]
     refusals = 0
-    for _ in range(1000):
+    for _ in range(300):
         file = rng.choice(files)
         content = file.read_bytes()
         file.write_bytes(corrupted(content, rng))
@@ -187,7 +187,7 @@ def test_damaged_records_are_refused_or_the_same(made, tmp_path):
                 assert ours == theirs or (ours[0] == "unreadable" and "is damaged" in ours[1])
             refusals += found != expected
         file.write_bytes(content)
-    assert numbers(Store.open(out)) == expected and refusals > 900
+    assert numbers(Store.open(out)) == expected and refusals > 270
 
 
 def test_a_front_without_a_record_counts_whatever_it_names(mark, out):

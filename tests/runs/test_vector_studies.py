@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_study import Inline
 from vector_problems import parabolas
 
 from macs import MACS, Front
@@ -44,6 +45,7 @@ def mine(tmp_path, monkeypatch) -> str:
 # Studies
 
 
+@pytest.mark.slow
 def test_a_study_runs_resumes_and_reports_vector_problems_beside_others(tmp_path, mine):
     (tmp_path / "many.toml").write_text(
         f"""
@@ -58,7 +60,7 @@ def test_a_study_runs_resumes_and_reports_vector_problems_beside_others(tmp_path
     study = Study.load(tmp_path / "many.toml", trust=True)
     assert [cell.transcription for cell in study.cells] == ["no transcription"] * 4 + ["dfet:2x2"] * 2
     assert study.cells[0].details["transcription"] is None and study.cells[0].details["problem"]["data"] == {"far": 3.0}
-    summary = study.run(tmp_path / "out", jobs=1)
+    summary = study.run(tmp_path / "out", executor=Inline())
     assert all(run.finished for run in summary.runs), summary
     files = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.nc")}
     again = study.run(tmp_path / "out")
@@ -121,7 +123,7 @@ def test_the_command_line_solves_shows_verifies_and_chooses(tmp_path, monkeypatc
     assert main(["show", "beam.nc", "--point", "2", "--plot", "point.png", "--csv", "point.csv"]) == 0
     out = capsys.readouterr().out
     assert f"weld length [in]     {front[2].parameters['weld length']:.10g}" in out and "buckling load" in out
-    assert Path("point.png").stat().st_size > 10_000 and Path("point.csv").read_text().startswith("cost [$],deflection [in]")
+    assert Path("point.png").stat().st_size > 10_000 and Path("point.csv").read_text().startswith("point,cost [$],deflection [in],verified")
     assert main(["verify", "beam.nc"]) == 0
     assert f"All {len(front)} points verify: evaluated again" in capsys.readouterr().out
     front.replace(F=front.F * 1.001).save("wrong.nc")

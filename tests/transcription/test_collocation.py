@@ -136,7 +136,9 @@ def test_gauss_is_dfet_with_controls_of_the_degree_of_the_states():
     assert [ours.variables[i].name for i in ours.free] == [dfet.variables[i].name for i in dfet.free]
     (Z, F, _), (W, G, _) = (nlp.propagate_and_score(nlp.first_guess(free)) for nlp in (ours, dfet))
     assert Z[:, places] == pytest.approx(W[:, ends], abs=1e-10) and pytest.approx(G, abs=1e-10) == F
-    one, two = (optimize(problem, method, objective="flight time", verify=None) for method in (ours.transcription, dfet.transcription))
+    one, two = (
+        optimize(problem, method, objective="flight time", verify=None, starts=1) for method in (ours.transcription, dfet.transcription)
+    )
     assert one.objectives["flight time"] == pytest.approx(two.objectives["flight time"], rel=1e-9)
 
 
@@ -312,8 +314,8 @@ def two_legs() -> Problem:
 def test_phases_free_times_interior_points_and_path_constraints(points):
     """The path limits hold at the points and at the ends of intervals, and all points agree on the optimum."""
     method, problem = Collocation(8, 4, points=points), two_legs()
-    front = payoff(problem, method, verify=None)
-    dfet = payoff(problem, DFET(8, 4, basis="bernstein"), verify=None)
+    front = payoff(problem, method, verify=None, starts=1)
+    dfet = payoff(problem, DFET(8, 4, basis="bernstein"), verify=None, starts=1)
     assert (front.status == "converged").all() and front.violation.max() < 1e-6
     assert np.diag(front.objectives) == pytest.approx(np.diag(dfet.objectives), rel=2e-3)
     trajectory = front[0].trajectory
@@ -329,7 +331,7 @@ def test_equality_paths_have_as_many_points_as_controls_have_values(points):
     problem, run = integrator()
     run.path("given", run["u"] - ca.cos(run.time), lower=0, upper=0)
     problem.minimize("end", run.final(run["x"]))
-    point = optimize(problem, Collocation(2, 8, points=points), verify=None)
+    point = optimize(problem, Collocation(2, 8, points=points), verify=None, starts=1)
     assert point.status == "converged" and point.objectives["end"] == pytest.approx(np.sin(2), abs=1e-7)
 
 
@@ -337,10 +339,10 @@ def test_equality_paths_have_as_many_points_as_controls_have_values(points):
 def test_bernstein_controls_stay_within_their_bounds_everywhere(points):
     problem = load("goddard")
     method = Collocation(4, 5, points=points, control="bernstein")
-    point = optimize(problem, method, objective="flight time", verify=None)
+    point = optimize(problem, method, objective="flight time", verify=None, starts=1)
     values = point.trajectory["ascent"].control(np.linspace(0, point.objectives["flight time"], 500))
     assert np.abs(values).max() <= np.pi / 2 + 1e-9
-    free = optimize(problem, Collocation(4, 5, points=points), objective="flight time", verify=None)
+    free = optimize(problem, Collocation(4, 5, points=points), objective="flight time", verify=None, starts=1)
     assert np.abs(free.trajectory["ascent"].control(np.linspace(0, 109, 500))).max() > np.pi / 2 + 1e-3, "else this shows nothing"
 
 
@@ -350,7 +352,7 @@ def test_peaks_absolute_values_and_periodic_controls(points):
     method, (problem, run) = Collocation(3, 4, points=points), integrator(final=1)
     problem.minimize("peak", run.peak(run["u"] ** 2))
     problem.minimize("way", run.integral(ca.fabs(run["u"])))
-    front = payoff(problem, method, verify=1e-5)
+    front = payoff(problem, method, verify=1e-5, starts=1)
     assert front.verified.all() and front.objectives[0] == pytest.approx([0.25, 1.0], abs=1e-6)
     assert front.objectives[1, 1] == pytest.approx(1.0, abs=1e-6)
     problem, run = integrator(bounds=(-np.pi, np.pi), period=2 * np.pi)
@@ -456,13 +458,13 @@ def test_searches_are_solved_saved_and_loaded(method, tmp_path):
     for name in ("y", "u"):
         assert np.array_equal(again[3].trajectory["ascent"].at(times)[name], front[3].trajectory["ascent"].at(times)[name])
     assert again[3].simulate().max_defect == front[3].simulate().max_defect
-    swept = sweep(load("goddard"), method, points=3, verify=None)
+    swept = sweep(load("goddard"), method, points=3, verify=None, starts=1)
     assert len(swept) == 3 and (swept.status == "converged").all()
 
 
 @pytest.mark.parametrize("points", POINTS)
 def test_meshes_are_refined_until_a_simulation_agrees(points):
-    coarse = optimize(load("standard/van_der_pol"), Collocation(8, 4, points=points), verify=None)
+    coarse = optimize(load("standard/van_der_pol"), Collocation(8, 4, points=points), verify=None, starts=1)
     assert coarse.simulate().violation > 1e-4
     refined = coarse.alone().refine_mesh(tolerance=1e-6)[0]
     check = refined.simulate()
@@ -472,7 +474,7 @@ def test_meshes_are_refined_until_a_simulation_agrees(points):
 
 def test_edges_move_to_the_switches():
     """Minimum time of the ascent is bang-bang, in closed form 109.10894511799619."""
-    coarse = optimize(load("goddard"), Collocation(4, 4), objective="flight time", verify=None)
+    coarse = optimize(load("goddard"), Collocation(4, 4), objective="flight time", verify=None, starts=1)
     (point,) = coarse.alone().refine_mesh(tolerance=1e-8)
     assert from_dict(point.transcription).mesh_of("ascent").moving and point.simulate().max_defect < 1e-8
     assert point.objectives["flight time"] == pytest.approx(109.10894511799619, rel=1e-9)
@@ -480,7 +482,7 @@ def test_edges_move_to_the_switches():
 
 def test_a_trajectory_of_another_method_is_interpolated():
     problem = load("goddard")
-    given = optimize(problem, DFET(4, 6), objective="horizontal speed", verify=None).trajectory
+    given = optimize(problem, DFET(4, 6), objective="horizontal speed", verify=None, starts=1).trajectory
     for points in POINTS:
         nlp = Collocation(4, 8, points=points).nlp(problem)
         near = nlp.unpack(nlp.interpolate(given))["ascent"]

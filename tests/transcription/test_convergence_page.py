@@ -11,6 +11,7 @@ import pytest
 PAGE = Path(__file__).parents[2] / "docs" / "convergence.py"
 
 
+@pytest.mark.slow
 def test_global_collocation_converges_exponentially(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page: dict[str, Any] = runpy.run_path(str(PAGE))
     page["main"].__globals__["TARGET"] = tmp_path / "convergence.png"

@@ -26,7 +26,7 @@ NOTHING = np.empty(0, dtype=int)
 
 def followed(problem, method, rounds=2):
     """The optimum of the first objective, and those on so many meshes with knots: pairs of objective and trajectory; the last method."""
-    compiled, point = problem.compile(), optimize(problem, method)
+    compiled, point = problem.compile(), optimize(problem, method, starts=1)
     assert point.status == "converged"
     found = [(float(point.F[0]), point.trajectory)]
     for _ in range(rounds):
@@ -156,17 +156,17 @@ def test_nothing_is_proposed_where_nothing_switches_or_moves():
     angle = run.control("angle", bounds=(-np.pi, np.pi), period=2 * np.pi)
     run.dynamics(x=u * ca.cos(angle))
     problem.minimize("effort", run.integral(u**2 + x**2))
-    point = optimize(problem, DFET(4, 3))
+    point = optimize(problem, DFET(4, 3), starts=1)
     assert switched(DFET(4, 3), problem, point.trajectory) is None
     assert list(phase_switches(point.trajectory["run"])) == ["u"]
     landing, *_ = moon_landing()
-    crude = optimize(landing, Euler(20))
+    crude = optimize(landing, Euler(20), starts=1)
     assert phase_switches(crude.trajectory["fall"])["u"] and switched(Euler(20), landing, crude.trajectory) is None
 
 
 def test_a_phase_of_no_length_has_no_switches():
     problem, *_ = moon_landing()
-    flight = optimize(problem, DFET(6, 4)).trajectory["fall"]
+    flight = optimize(problem, DFET(6, 4), starts=1).trajectory["fall"]
     still = replace(
         flight, state=replace(flight.state, edges=0 * flight.state.edges), control=replace(flight.control, edges=0 * flight.state.edges)
     )
@@ -230,7 +230,7 @@ def test_long_arcs_of_constant_controls_have_half_the_elements_and_others_two_mo
 
 def test_controls_are_constant_where_they_are_on_bounds():
     problem, *_ = moon_landing()
-    flight = optimize(problem, DFET(8, 3, basis="bernstein")).trajectory["fall"]
+    flight = optimize(problem, DFET(8, 3, basis="bernstein"), starts=1).trajectory["fall"]
     found = phase_switches(flight)
     (switch,) = found["u"]
     assert (switch.before, switch.after) == (LOWER, UPPER)

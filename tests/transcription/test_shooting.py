@@ -280,20 +280,20 @@ def test_goddard_against_its_closed_form():
     nlp = MultipleShooting(40, control="linear").transcribe(load("goddard"))
     assert all(label in nlp.g_labels for label in ("dynamics of ascent.vx", "final value of ascent.y"))
     problem = load("goddard")
-    best = optimize(problem, MultipleShooting(40, control="linear"), objective="horizontal speed")
+    best = optimize(problem, MultipleShooting(40, control="linear"), objective="horizontal speed", starts=1)
     law = goddard.optimal_flight(250.0)
     assert best.status == "converged" and best.optimality < 1e-6
     assert best.objectives["horizontal speed"] == pytest.approx(law["vx"][-1], rel=2e-8)
     times = law["time"][:-1]
     assert best.trajectory["ascent"].at(times)["y"] == pytest.approx(law["y"][:-1], abs=2e-3)
     assert best.simulate().max_defect < 1e-6
-    quick = optimize(problem, MultipleShooting(40, control="linear"), objective="flight time")
+    quick = optimize(problem, MultipleShooting(40, control="linear"), objective="flight time", starts=1)
     assert quick.objectives["flight time"] == pytest.approx(goddard.shortest_time(), rel=1e-3)
 
 
 def test_single_and_multiple_shooting_have_the_same_optimum():
     problem = load("goddard")
-    found = [optimize(problem, method, objective="flight time") for method in (SingleShooting(11), MultipleShooting(10))]
+    found = [optimize(problem, method, objective="flight time", starts=1) for method in (SingleShooting(11), MultipleShooting(10))]
     assert found[0].objectives["flight time"] == pytest.approx(found[1].objectives["flight time"], rel=1e-7)
     assert np.array_equal([v.name for v in found[0].variables if ".u" in v.name], [v.name for v in found[1].variables if ".u" in v.name])
 
@@ -301,10 +301,10 @@ def test_single_and_multiple_shooting_have_the_same_optimum():
 def test_a_long_chain_is_not_written_out_for_derivatives(monkeypatch):
     from transcription.shooting import phase as shooting_phase
 
-    plain = optimize(load("goddard"), SingleShooting(11), objective="flight time")
+    plain = optimize(load("goddard"), SingleShooting(11), objective="flight time", starts=1)
     monkeypatch.setattr(shooting_phase, "LONG", 0)
     assert SingleShooting(11).transcribe(load("goddard")).functions.is_a("MXFunction")
-    chained = optimize(load("goddard"), SingleShooting(11), objective="flight time")
+    chained = optimize(load("goddard"), SingleShooting(11), objective="flight time", starts=1)
     assert chained.objectives["flight time"] == pytest.approx(plain.objectives["flight time"], rel=1e-9)
 
 
@@ -338,7 +338,7 @@ def two_legs() -> Problem:
 
 
 def test_linked_phases_a_free_time_between_them_and_a_parameter():
-    found = [optimize(two_legs(), method, objective="effort") for method in (MultipleShooting(12, control="linear"), DFET(4, 3))]
+    found = [optimize(two_legs(), method, objective="effort", starts=1) for method in (MultipleShooting(12, control="linear"), DFET(4, 3))]
     assert [point.status for point in found] == ["converged"] * 2
     assert found[0].objectives["effort"] == pytest.approx(found[1].objectives["effort"], rel=1e-3)
     flight = found[0].trajectory
@@ -385,14 +385,14 @@ def test_a_trajectory_comes_back_as_the_vector_it_was_made_of(method):
 
 def test_flights_go_from_one_method_to_another():
     problem = load("goddard")
-    start = optimize(problem, DFET(4, 6), objective="horizontal speed")
+    start = optimize(problem, DFET(4, 6), objective="horizontal speed", starts=1)
     for method in (SingleShooting(41, control="linear"), MultipleShooting(20, control="spline"), MultipleShooting(30)):
         nlp = method.transcribe(problem)
         z = nlp.interpolate(start.trajectory)
         assert nlp.evaluate(nlp.propagate(z[None]))[1][0] < 0.02
         back = DFET(4, 6).transcribe(problem).interpolate(nlp.unpack(z))
         assert np.abs(back - start.decision).max() < 0.2
-    again = optimize(problem, MultipleShooting(30), objective="horizontal speed", start=start)
+    again = optimize(problem, MultipleShooting(30), objective="horizontal speed", start=start, starts=1)
     assert again.status == "converged" and again.objectives["horizontal speed"] == pytest.approx(0.9038897, rel=1e-4)
 
 

@@ -141,7 +141,7 @@ def test_each_phase_has_a_mesh_of_its_own():
     problem.link(first, second)
     problem.minimize("effort", first.integral(first["u"] ** 2) + second.integral(second["u"] ** 2))
     method = MultipleShooting(7, control="linear", mesh={"second": (EDGES, 4)})
-    point = optimize(problem, method)
+    point = optimize(problem, method, starts=1)
     assert point.status == "converged" and point.verified
     assert point.objectives["effort"] == pytest.approx(1.5, abs=1e-4), "12 / 2^3, with a control that is a straight line"
     flight = point.trajectory
@@ -153,11 +153,15 @@ def test_the_optimum_of_the_ascent_on_other_intervals(tmp_path):
     """Linear tangent steering at 250 s: 0.903889755358877 km/s, a closed form."""
     edges = tuple((0.5 * (np.linspace(0, 1, 41) + np.linspace(0, 1, 41) ** 2)).tolist())
     method = MultipleShooting(40, control="linear", mesh={"ascent": (edges, 4)})
-    point = optimize(load("goddard"), method, objective="horizontal speed")
+    point = optimize(load("goddard"), method, objective="horizontal speed", starts=1)
     assert point.verified and point.objectives["horizontal speed"] == pytest.approx(0.903889755358877, abs=1e-5)
-    start = optimize(load("goddard"), DFET(4, 6), objective="horizontal speed")
+    start = optimize(load("goddard"), DFET(4, 6), objective="horizontal speed", starts=1)
     again = optimize(
-        load("goddard"), method, objective="horizontal speed", start=method.nlp(load("goddard")).interpolate(start.trajectory)[None]
+        load("goddard"),
+        method,
+        objective="horizontal speed",
+        start=method.nlp(load("goddard")).interpolate(start.trajectory)[None],
+        starts=1,
     )
     assert again.objectives["horizontal speed"] == pytest.approx(point.objectives["horizontal speed"], abs=1e-7)
     Front.of(point.alone()).save(tmp_path / "front.nc")

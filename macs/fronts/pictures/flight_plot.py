@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from problems.compiled import Limit, Variable
 
 from .limits import draw_limits
-from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, plain, wrapped
+from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, per, plain, wrapped
 
 if TYPE_CHECKING:
     from transcription.trajectories.costates import Costates, PhaseCostates
@@ -29,12 +30,34 @@ FLAT = 0.02
 """Least range in which costates and the Hamiltonian are drawn, as a part of what all costates are worth: less is round-off."""
 
 
+NO_LENGTH = 1e-6
+"""Part of the whole duration that a phase lasts at most where it has no length."""
+
+
 NODES = 60
 """Most nodes of a phase that are drawn as dots: more would hide the line."""
 
 
 PANEL = (3.6, 1.75)
 """Inches: width and height of a panel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A trajectory in a panel.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    color : str
+        Of all its phases, the ends of which are dots then. Default: a colour for each phase, and dots at nodes.
+    hollow : bool
+        Whether the dots at nodes are hollow, and drawn in any case: of a trajectory that is not verified.
+    """
+
+    trajectory: Trajectory
+    color: str = ""
+    hollow: bool = False
 
 
 def draw_flight(
@@ -64,7 +87,8 @@ def draw_flight(
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
         panels = quantities(trajectory)
-        states = [] if costates is None else [name for name, kind in panels if kind == "state"]
+        least = {} if costates is None else costate_ranges(trajectory, costates)
+        states = [name for name, kind in panels if kind == "state" and name in least]
         columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
         above = -(-len(panels) // columns)
         rows = above if costates is None else above - (-(len(states) + 1) // columns)
@@ -74,35 +98,36 @@ def draw_flight(
             figure.set_size_inches(PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.6)
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for ax, (name, kind) in zip(grid, panels, strict=False):
-            _draw_panel(ax, trajectory, name, kind, hollow)
+            draw_panel(ax, [Drawn(trajectory, hollow=hollow)], name, kind)
         used = list(range(len(panels)))
         if costates is not None:
             used += range(above * columns, above * columns + len(states) + 1)
-            _draw_costates(grid[used[len(panels) :]], trajectory, costates, states)
+            _draw_costates(grid[used[len(panels) :]], trajectory, costates, least, states)
         for ax in np.delete(grid, used):
             ax.remove()
         _finish(figure, grid, used, columns, trajectory, title)
     return grid[used]
 
 
-def _draw_costates(axes: Sequence[Any], trajectory: Trajectory, costates: Costates, states: Sequence[str]) -> None:
-    """Draw the costates of these states over time, one on each of the axes, and the Hamiltonian on the last one."""
-    worth = max(costates_worth(phase, costates[phase.name]) for phase in trajectory.phases)
+def _draw_costates(
+    axes: Sequence[Any], trajectory: Trajectory, costates: Costates, least: Mapping[str | None, float], states: Sequence[str]
+) -> None:
+    """Draw the costates of these states over time, one on each of the axes, and the Hamiltonian on the last one, in the `least` ranges at
+    least. Those of phases without length are left out."""
     for ax, name in zip(axes, [*states, None], strict=True):
         everything: list[np.ndarray] = []
-        ranges: list[np.ndarray] = []
         units: list[str] = []
         for k, phase in enumerate(trajectory.phases):
+            if not has_length(trajectory, phase):
+                continue
             own, color = costates[phase.name], COLORS[k % len(COLORS)]
             if name is None:
                 values = own.hamiltonian
-                ranges.append(phase.time)
                 units.append(phase.time_unit)
                 ax.plot(phase.time, values, color=color, lw=1.0)
             elif name in own:
                 values = own[name]
                 units.append(next(v.unit for v in phase.state_variables if v.name == name))
-                ranges.append(_range_of(phase, name))
                 times, line = _dense(own.polynomial.edges, own.polynomial.on_element, own.names.index(name), None)
                 ax.plot(times, line, color=color, lw=1.3)
                 everything.append(line[np.isfinite(line)])
@@ -110,14 +135,17 @@ def _draw_costates(axes: Sequence[Any], trajectory: Trajectory, costates: Costat
                 continue
             _dots(ax, phase.time, values, color)
             everything.append(values)
-        drawn, unit = np.concatenate(everything), float(np.ptp(np.concatenate(ranges)))
-        least = FLAT * worth / unit if unit > 0 else 0.0
-        middle, half = 0.5 * (drawn.max() + drawn.min()), 0.5 * max(float(np.ptp(drawn)), least, 1e-12)
+        drawn = np.concatenate(everything)
+        middle, half = 0.5 * (drawn.max() + drawn.min()), 0.5 * max(float(np.ptp(drawn)), least[name], 1e-12)
         ax.set_ylim(middle - 1.12 * half, middle + 1.12 * half)
-        per = f"per {units[0]}" if len(set(units)) == 1 and units[0] else ""
-        ax.set_ylabel(_beside("Hamiltonian" if name is None else f"costate of {name}", per))
+        unit = per(units[0]) if len(set(units)) == 1 else ""
+        ax.set_ylabel(_beside("Hamiltonian" if name is None else f"costate of {name}", unit))
     weights = ", ".join(f"{weight:.3g}" for weight in costates.weights)
     axes[-1].set_title(f"weights of the objectives: {weights}", loc="right", fontsize=7, color=GREY, pad=2)
+    left_out = [phase.name for phase in trajectory.phases if not has_length(trajectory, phase)]
+    if left_out:
+        words = f"no costates of {', '.join(left_out)}: without length"
+        axes[0].set_title(plain(words), loc="right", fontsize=7, color=GREY, pad=2)
 
 
 def _beside(name: str, unit: str) -> str:
@@ -141,7 +169,27 @@ def _range_of(phase: PhaseTrajectory, name: str) -> np.ndarray:
     return values if np.ptp(values) >= least else np.array([0.0, least])
 
 
-def costates_worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
+def has_length(trajectory: Trajectory, phase: PhaseTrajectory) -> bool:
+    """Whether a phase has a length. The multipliers of one without are no costates. If no phase has any, all count as if they had."""
+    lengths = [one.tf - one.t0 for one in trajectory.phases]
+    whole = max(one.tf for one in trajectory.phases) - min(one.t0 for one in trajectory.phases)
+    return phase.tf - phase.t0 > NO_LENGTH * whole or max(lengths) <= NO_LENGTH * whole
+
+
+def costate_ranges(trajectory: Trajectory, costates: Costates) -> dict[str | None, float]:
+    """The least range in which the costate of each state is drawn, and the Hamiltonian (None): less is round-off."""
+    phases = [phase for phase in trajectory.phases if has_length(trajectory, phase)]
+    worth = FLAT * max(_worth(phase, costates[phase.name]) for phase in phases)
+    names = dict.fromkeys(name for phase in phases for name in costates[phase.name])
+    ranges: dict[str | None, list[np.ndarray]] = {
+        **{name: [_range_of(phase, name) for phase in phases if name in costates[phase.name]] for name in names},
+        None: [phase.time for phase in phases],
+    }
+    spans = {name: float(np.ptp(np.concatenate(values))) for name, values in ranges.items()}
+    return {name: worth / span if span > 0 else 0.0 for name, span in spans.items()}
+
+
+def _worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
     """How much the largest costate of each state is worth over the range of the state, all states together."""
     return float(np.abs(costates.at_nodes).max(axis=0, initial=0.0) @ np.ptp(phase.states, axis=0))
 
@@ -165,29 +213,46 @@ def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
     return phase.time, phase[name]
 
 
-def _draw_panel(ax: Any, trajectory: Trajectory, name: str, kind: str, hollow: bool) -> None:
-    drawn: list[np.ndarray] = []
-    limits: list[tuple[PhaseTrajectory, Variable | Limit]] = []
-    for k, phase in enumerate(trajectory.phases):
-        owners: dict[str, Sequence[Variable | Limit]] = {
-            "state": phase.state_variables,
-            "control": phase.control_variables,
-            "path": phase.path_limits,
-        }
-        index = next((i for i, owner in enumerate(owners[kind]) if owner.name == name), None)
-        if index is None:
-            continue
-        color = COLORS[k % len(COLORS)]
-        values, (times, line) = phase[name], along(phase, name)
-        ax.plot(times, line, color=color, lw=0.9 if kind == "path" else 1.3)
-        drawn.append(line[np.isfinite(line)])
-        _dots(ax, phase.time, values, color, hollow)
-        drawn.append(values)
-        limits.append((phase, owners[kind][index]))
-    draw_limits(ax, np.concatenate(drawn), [((phase.t0, phase.tf), limit.lower, limit.upper) for phase, limit in limits])
-    ax.set_ylabel(_beside(name, getattr(limits[0][1], "unit", "")))
-    ranges = dict.fromkeys(_range(limit) for _, limit in limits)
-    ax.set_title("; ".join(ranges), loc="right", fontsize=7, color=GREY, pad=2)
+def draw_panel(ax: Any, drawn: Sequence[Drawn], name: str, kind: str) -> None:
+    """Draw a quantity of `quantities` of one trajectory or several over time, with its limits, label, and bounds as text.
+
+    Parameters
+    ----------
+    ax : Axes
+    drawn : sequence of Drawn
+    name, kind : str
+    """
+    values: list[np.ndarray] = []
+    held: dict[tuple[float, float], list[PhaseTrajectory]] = {}
+    owners: list[Variable | Limit] = []
+    for one in drawn:
+        for k, phase in enumerate(one.trajectory.phases):
+            lists: dict[str, Sequence[Variable | Limit]] = {
+                "state": phase.state_variables,
+                "control": phase.control_variables,
+                "path": phase.path_limits,
+            }
+            owner = next((owner for owner in lists[kind] if owner.name == name), None)
+            if owner is None:
+                continue
+            color = one.color or COLORS[k % len(COLORS)]
+            nodes, (times, line) = phase[name], along(phase, name)
+            ax.plot(times, line, color=color, lw=0.9 if kind == "path" and not one.color else 1.3)
+            values += [line[np.isfinite(line)], nodes]
+            if not one.color:
+                _dots(ax, phase.time, nodes, color, one.hollow)
+            elif one.hollow:
+                _dots(ax, phase.time, nodes, color, hollow=True)
+            if one.color and phase is not one.trajectory.phases[-1]:
+                ax.plot(phase.time[-1:], nodes[-1:], "o", color=color, ms=4.0)
+            held.setdefault((owner.lower, owner.upper), []).append(phase)
+            owners.append(owner)
+    limits = [
+        ((min(phase.t0 for phase in phases), max(phase.tf for phase in phases)), lower, upper) for (lower, upper), phases in held.items()
+    ]
+    draw_limits(ax, np.concatenate(values), limits)
+    ax.set_ylabel(_beside(name, getattr(owners[0], "unit", "")))
+    ax.set_title("; ".join(dict.fromkeys(_range(owner) for owner in owners)), loc="right", fontsize=7, color=GREY, pad=2)
 
 
 def _dense(
@@ -232,6 +297,7 @@ def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, tr
     if len(trajectory) > 1:
         from matplotlib.lines import Line2D
 
-        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=plain(name)) for k, name in enumerate(trajectory)]
+        names = [phase.name if has_length(trajectory, phase) else f"{phase.name} (no length)" for phase in trajectory.phases]
+        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=plain(name)) for k, name in enumerate(names)]
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
     figure.suptitle(wrapped(plain(title), figure.get_figwidth()), fontsize=9, x=0.01, ha="left")

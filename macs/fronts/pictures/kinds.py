@@ -8,7 +8,7 @@ import numpy as np
 
 from ...evaluation.evaluator import CONVERGED
 
-NOT_VERIFIED, NOT_FEASIBLE = "not verified", "not feasible"
+NOT_VERIFIED, NOT_FEASIBLE, NOT_SIMULATED = "not verified", "not feasible", "not simulated"
 """Words of legends."""
 
 
@@ -24,8 +24,15 @@ def kinds(front: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return feasible & ~apart, apart, ~feasible
 
 
+def hollow(point: Any) -> bool:
+    """Whether a point is drawn hollow: it is not feasible, or was simulated and is not verified."""
+    return point.status != CONVERGED or point.verified is False
+
+
 def remark(point: Any) -> str:
-    """What a title says of a point that is drawn hollow: "not verified" or "not feasible"; empty for the others."""
+    """What a title says of a point: "not feasible", "not verified" or "not simulated"; empty if there is nothing to say."""
     if point.status != CONVERGED:
         return NOT_FEASIBLE
-    return NOT_VERIFIED if point.verified is False else ""
+    if point.verified is None:
+        return NOT_SIMULATED if point.trajectory is not None else ""
+    return "" if point.verified else NOT_VERIFIED

@@ -6,7 +6,7 @@ from typing import Any
 
 from ...io.html import html_block, html_table
 from .flight_plot import draw_flight, quantities
-from .kinds import remark
+from .kinds import hollow
 from .style import blank_figure, rendered
 
 MOST = 24
@@ -33,7 +33,7 @@ def point_html(point: Any) -> str:
     about += [point.note] if point.note else []
     picture, figure = b"", blank_figure()
     if point.trajectory is not None and len(quantities(point.trajectory)) <= MOST:
-        draw_flight(point.trajectory, "", figure, hollow=bool(remark(point)))
+        draw_flight(point.trajectory, "", figure, hollow=hollow(point))
         picture = rendered(figure, "png", 55)
     elif not point.dynamic:
         point.plot(figure)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import textwrap
+from os import PathLike
 from typing import Any
 
 from problems.compiled import Objective
@@ -20,8 +21,8 @@ LETTER = 0.6
 """Width of a letter, of its size: more than that of most words, so that lines end before the picture does."""
 
 
-POWER = re.compile(r"\b(m|mm|cm|km|s|min|h|d|yr|ft|in|rad|deg|K|DU|TU)\^?(-?\d)\b")
-"""A unit of length, time, angle or temperature with its power, as it is typed: m2, s^2."""
+POWER = re.compile(r"\b(m|mm|cm|km|s|min|h|d|yr|ft|in|rad|deg|K|DU|TU|(?<!g )(?<!t )(?<!l )k?N|kg|J|W|Pa|kPa|V|A)\^?(-?\d)\b")
+"""A unit with its power, as it is typed: m2, s^2, N2; but not what a mass or an amount is of, such as t N2."""
 
 
 RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -41,7 +42,8 @@ STYLE = {
     "grid.linewidth": 0.5,
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 6),
+    "axes.formatter.limits": (-4, 7),
+    "axes.formatter.use_mathtext": True,
 }
 
 
@@ -77,9 +79,25 @@ def label(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
+def per(unit: str) -> str:
+    """Unit of what is per unit of something, such as a costate; empty if it has none."""
+    return f"per {unit}" if unit else ""
+
+
+def check_no_path(given: Any, call: str) -> None:
+    """Raise ValueError if the name of a file is given where a figure or axes belong; `call` is what is drawn into a file."""
+    if isinstance(given, str | PathLike):
+        raise ValueError(f"a picture is drawn into a figure, not into a file: to write one, {call}.figure.savefig({str(given)!r})")
+
+
 def axis_label(name: str, unit: str) -> str:
-    """Label of an axis: `name [unit]`, with powers as print has them: m², not m2. Lines do not end within the unit."""
-    return plain(label(name, POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit).replace(" ", "\N{NO-BREAK SPACE}")))
+    """Label of an axis: `name [unit]`, with powers as print has them. Lines do not end within the unit."""
+    return plain(label(name, raised(unit).replace(" ", "\N{NO-BREAK SPACE}")))
+
+
+def raised(unit: str) -> str:
+    """A unit with powers as print has them: m², not m2."""
+    return POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit)
 
 
 def plain(text: str) -> str:
@@ -88,9 +106,11 @@ def plain(text: str) -> str:
 
 
 def axis_number(value: float) -> str:
-    """A number beside an axis: four digits, five of large ones, without powers of ten from a ten-thousandth to a million."""
-    text = f"{value + 0.0:.4g}" if abs(value) < 1e4 or abs(value) >= 1e6 else f"{value:.0f}"
-    return text.replace("-", "\N{MINUS SIGN}")
+    """A number beside an axis: four digits, all of large ones, without powers of ten from a ten-thousandth to ten millions."""
+    text = f"{value + 0.0:.4g}" if abs(value) < 1e4 or abs(value) >= 1e7 else f"{value:.0f}"
+    digits, _, power = text.partition("e")
+    rest = f"\N{MULTIPLICATION SIGN}10{str(int(power)).translate(RAISED)}" if power else ""
+    return digits.replace("-", "\N{MINUS SIGN}") + rest
 
 
 def wrapped(text: str, width: float, size: float = 9.0) -> str:

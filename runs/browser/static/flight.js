@@ -16,7 +16,7 @@ async function showFlights() {
   const mine = (drawing += 1);
   const keys = [...new Set([...state.kept, ...(state.selected ? [state.selected] : [])])];
   const points = keys.map((key) => state.byKey.get(key)).filter(Boolean);
-  byId("flights").hidden = state.points.length > 0 && state.comparison.runs.every((run) => !run.about.dynamic);
+  hideFlights();
   if (!points.length) {
     clearPanels();
     fill(byId("flights-note"), "Select a point to see its states, controls, path constraints and costates.");
@@ -40,6 +40,11 @@ async function showFlights() {
   drawPanels(flights);
 }
 
+/** Where no point has a trajectory, there is no place for them either. */
+function hideFlights() {
+  byId("flights").hidden = state.points.length > 0 && state.comparison.runs.every((run) => !run.about.dynamic);
+}
+
 function clearPanels() {
   const place = byId("flights-plot");
   place.querySelectorAll(".panel-plot").forEach(retire);
@@ -55,7 +60,12 @@ function flightsNote(flights) {
   ]);
   const phases = flights[0].detail.phases.map((phase) => phase.name);
   const several = phases.length > 1 ? ` Dotted lines are the ends of the phases ${phases.join(", ")}.` : "";
-  return [...names, `Dashed lines are limits, where they are near; the text above each panel always gives them.${several}`];
+  const all = flights.flatMap(({ detail }) => detail.phases);
+  const left = all.some((phase) => phase.quantities.some((one) => one.kind === "hamiltonian"))
+    ? [...new Set(all.filter((phase) => !phase.lasts).map((phase) => phase.name))]
+    : [];
+  const without = left.length ? ` Without length, and therefore without costates: ${left.join(", ")}.` : "";
+  return [...names, `Dashed lines are limits, where they are near; the text above each panel always gives them.${several}${without}`];
 }
 
 /** All quantities of some flights, each once, in groups: [[title, [name, kind], ...], ...]. */
@@ -76,6 +86,7 @@ function groups(flights) {
 function drawPanels(flights) {
   const place = byId("flights-plot");
   clearPanels();
+  if (!canDraw()) return;
   for (const [title, quantities] of groups(flights)) {
     const grid = element("div", { class: "panels" });
     place.append(element("h3", {}, title), grid);
@@ -83,7 +94,7 @@ function drawPanels(flights) {
       const figure = panelFigure(flights, quantity);
       const plot = element("div", { class: "panel-plot", role: "img", "aria-label": figure.words });
       grid.append(element("div", { class: "panel" }, element("p", { class: "panel-title" }, figure.title, " ", element("span", { class: "note" }, figure.limits)), plot));
-      draw(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
+      drawWhenSeen(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
     }
   }
   byId("flights").dataset.drawn = flights.map(({ point }) => point.key).join(" "); // for tests and style sheets
@@ -131,6 +142,8 @@ function panelFigure(flights, { name, kind, unit }) {
   }
   for (const { y0, layer } of shapes) if (layer === "below" && y0 !== undefined) [low, high] = [Math.min(low, y0), Math.max(high, y0)];
   const margin = 0.07 * (high - low);
+  const phases = flights.flatMap(({ detail }) => detail.phases);
+  const [first, last] = extent(phases.flatMap((phase) => [phase.t0, phase.tf]));
   const units = [...new Set(limits.map((one) => one.phase.unit))].join(" | ");
   return {
     traces,
@@ -142,7 +155,7 @@ function panelFigure(flights, { name, kind, unit }) {
       margin: { l: 52, r: 8, t: 6, b: 34 },
       showlegend: false,
       shapes,
-      xaxis: axis(withUnit("time", plotText(units)), { title: { text: plotText(withUnit("time", units)), standoff: 4 }, nticks: 6 }),
+      xaxis: axis(withUnit("time", plotText(units)), { title: { text: plotText(withUnit("time", units)), standoff: 4 }, nticks: 6, range: first < last ? [first, last] : undefined }),
       yaxis: axis("", { range: [low - margin, high + margin], nticks: 5 }),
     }),
   };

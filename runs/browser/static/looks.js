@@ -24,11 +24,13 @@ const axis = (title, more = {}) => ({
   ticks: "outside",
   ticklen: 4,
   exponentformat: "power",
+  minexponent: 7,
   ...more,
 });
 
 const layout = (more = {}) => ({
   font: FONT,
+  separators: ".", // of decimals; none of thousands
   paper_bgcolor: "#fff",
   plot_bgcolor: "#fff",
   margin: { l: 60, r: 34, t: 30, b: 50 },
@@ -48,28 +50,58 @@ const CONFIG = {
   toImageButtonOptions: { format: "png", scale: 3 },
 };
 
-const canvas = document.createElement("canvas");
-/** Whether there is a graphics interface for figures in space, parallel coordinates and many points. */
-const HAS_GL = Boolean(canvas.getContext("webgl"));
+let graphics = null;
+/** Whether there is a graphics interface for figures in space, parallel coordinates and many points. Asked only if need be: it takes long. */
+const hasGl = () => (graphics ??= Boolean(document.createElement("canvas").getContext("webgl")));
 
-/** The text that a point shows under the pointer. */
-function hoverText(point) {
+/** Whether the drawing package has been read: it is large, and what needs no figure is shown before. */
+const canDraw = () => "Plotly" in window;
+
+/** What a point shows under the pointer: the data of each point, and the text that they are put into once it is shown. */
+const hoverData = (point) => [point.key, plotText(pointName(point)), statusOf(point), ...point.values];
+function hoverTemplate() {
   const lines = state.comparison.goals.map((goal, i) => {
-    const unit = goal.unit ? ` ${plotText(goal.unit)}` : "";
-    return `${plotText(goal.name)} ${number(point.values[i])}${unit}`;
+    const [name, unit] = [goal.name, goal.unit].map((text) => plotText(text).replace(/[{}%]/g, ""));
+    return `${name} %{customdata[${i + 3}]:.6~g}${unit ? ` ${unit}` : ""}`;
   });
-  return [`<b>${plotText(pointName(point))}</b>, ${statusOf(point)}`, ...lines].join("<br>");
+  return ["<b>%{customdata[1]}</b>, %{customdata[2]}", ...lines].join("<br>") + "<extra></extra>";
 }
 
 const pending = new WeakMap();
+const unseen = new Map(); // places of figures that are not drawn yet, and how they are to be drawn
+const watcher = new IntersectionObserver(
+  (entries) => entries.filter((one) => one.isIntersecting).forEach((one) => drawUnseen(one.target)),
+  { rootMargin: "300px" },
+);
+window.addEventListener("beforeprint", () => [...unseen.keys()].forEach(drawUnseen));
 
-/** Draw a figure. */
+/** Draw a figure once it comes into view, or the page is printed. */
+function drawWhenSeen(place, ...figure) {
+  if (pending.has(place)) return draw(place, ...figure);
+  unseen.set(place, figure);
+  watcher.observe(place);
+}
+
+function drawUnseen(place) {
+  const figure = unseen.get(place);
+  forget(place);
+  if (figure) draw(place, ...figure);
+}
+
+function forget(place) {
+  unseen.delete(place);
+  watcher.unobserve(place);
+}
+
+/** Draw a figure now. */
 function draw(place, traces, figure, config = CONFIG) {
   pending.set(place, Plotly.react(place, traces, figure, config));
 }
 
 /** Give up a figure, once its last drawing has ended: the package still reads what it draws. */
 function retire(place) {
+  forget(place);
+  if (!pending.has(place)) return;
   const free = () => Plotly.purge(place);
   Promise.resolve(pending.get(place)).then(free, free);
 }

@@ -1,5 +1,5 @@
 "use strict";
-// Begins: reads the data of the page, builds what does not change, and links the parts.
+// Links the parts, and builds what is not of one part alone.
 
 const VIEWS = [
   ["two", "Two objectives", 2],
@@ -8,7 +8,6 @@ const VIEWS = [
 ];
 
 function begin() {
-  state.data = JSON.parse(byId("page").textContent);
   on("comparison", () => {
     resetView();
     buildChoices();
@@ -18,6 +17,7 @@ function begin() {
   });
   on("filter", () => {
     showPreferences();
+    announceWanted();
     drawFront();
     showTable();
   });
@@ -29,7 +29,25 @@ function begin() {
     showPoint();
     showFlights();
   });
-  showComparison(state.data.comparisons[0]);
+  on("renewal", () => {
+    if (axesShown !== axesPossible()) rebuilt(byId("views"), buildViews);
+    rebuilt(byId("choices"), buildChoices);
+    renewPreferences();
+    drawFront();
+    rebuilt(byId("table"), showTable);
+    if (!selectedPoint()) showPoint();
+    hideFlights();
+    showAbout();
+    showStudy();
+  });
+}
+
+/** To be called once the drawing package has been read. */
+function drawFigures() {
+  if (!state.comparison) return;
+  drawFront();
+  redrawStudy();
+  showFlights();
   document.documentElement.dataset.ready = "yes";
 }
 
@@ -38,6 +56,11 @@ function refresh() {
   showTable();
   showPoint();
   showFlights();
+  showAbout();
+}
+
+/** Of one front the lines above and below its table. */
+function showAbout() {
   const [run] = state.comparison.runs;
   if (state.data.kind === "front") {
     fill(byId("headline"), run.about.headline);
@@ -63,10 +86,15 @@ function resetView() {
   buildViews();
 }
 
+/** What the choices above the figure depend on. */
+const axesPossible = () => JSON.stringify([state.comparison.goals, state.comparison.solvers.length > 1]);
+let axesShown = "";
+
 function buildViews() {
   const { goals, solvers } = state.comparison;
+  axesShown = axesPossible();
   const options = goals.map((goal, i) => [i, goal.name]);
-  const possible = VIEWS.filter(([kind, , least]) => goals.length >= least && (kind === "two" || HAS_GL));
+  const possible = VIEWS.filter(([, , least]) => goals.length >= least);
   const tabs = element("div", { role: "tablist", "aria-label": "Kind of figure" }, possible.map(([kind, words]) => tab(kind, words)));
   const axisOf = (letter, words) => choice(words, options, view[letter], (value) => {
     view[letter] = Number(value);
@@ -85,6 +113,10 @@ function buildViews() {
 function tab(kind, words) {
   const chosen = view.kind === kind;
   const show = (next) => {
+    if (next !== "two" && !hasGl()) {
+      fill(byId("plot-note"), "This browser has no WebGL, without which it cannot draw this figure.");
+      return announce(byId("plot-note").textContent);
+    }
     view.kind = next;
     buildViews();
     drawFront();
@@ -105,6 +137,7 @@ let drawn = null; // the kind of figure that is there
 
 /** Draw the figure of the front. One of another kind begins with an empty place. */
 function drawFront() {
+  if (!canDraw()) return;
   let place = byId("plot");
   const kinds = { two: drawTwo, three: drawThree, parallel: drawParallel };
   const fresh = drawn !== view.kind;
@@ -122,7 +155,10 @@ function drawFront() {
   const shown = shownPoints();
   const names = view.kind === "parallel" ? goals.map((goal) => goal.name) : [view.x, view.y, ...(view.kind === "three" ? [view.z] : [])].map((i) => goals[i].name);
   place.setAttribute("aria-label", `Figure of ${counted(shown.length, "point")} over ${names.join(", ")}; the table of points has the same data`);
-  fill(byId("plot-note"), NOTES[view.kind] + (shown.some((point) => !counts(point)) ? " Hollow points are not verified." : ""));
+  const notes = [NOTES[view.kind]];
+  if (shown.some((point) => !counts(point))) notes.push("Hollow points are not verified.");
+  if (view.kind !== "parallel" && shownGoing().length) notes.push("Crosses are points so far of runs that have not ended, not simulated yet.");
+  fill(byId("plot-note"), notes.join(" "));
 }
 
 const NOTES = {
@@ -131,12 +167,19 @@ const NOTES = {
   parallel: "Each line is a point; the upper end of every axis is better. Drag along an axis to mark a range that is wanted; a click on the axis ends that.",
 };
 
-/** In a study, which comparison, solvers and run are shown. */
+let choicesShown = "";
+
+/** In a study, which comparison, solvers and run are shown. They are left alone where they would be the same. */
 function buildChoices() {
   const { comparisons, kind } = state.data;
   if (kind === "front") return;
   const { solvers, runs } = state.comparison;
-  const which = choice("Problem and transcription", comparisons.map((one, k) => [k, one.name]), comparisons.indexOf(state.comparison), (k) => showComparison(comparisons[k]));
+  const numbers = [...new Set(runs.map((run) => run.number))].sort((a, b) => a - b);
+  const shown = JSON.stringify([comparisons.map((one) => one.name), comparisons.indexOf(state.comparison), solvers, numbers, [...state.hidden], state.run]);
+  if (shown === choicesShown) return;
+  choicesShown = shown;
+  const words = kind === "fronts" ? "Problem" : "Problem and transcription";
+  const which = choice(words, comparisons.map((one, k) => [k, one.name]), comparisons.indexOf(state.comparison), (k) => showComparison(state.data.comparisons[k]));
   const boxes = solvers.map((solver, k) => {
     const toggle = (event) => {
       if (event.target.checked) state.hidden.delete(solver);
@@ -147,12 +190,9 @@ function buildChoices() {
     const sign = element("span", { class: "swatch", style: `color: ${colorOf(k)}`, "aria-hidden": "true" }, SIGNS[k % SIGNS.length]);
     return element("label", {}, element("input", { type: "checkbox", checked: !state.hidden.has(solver), onchange: toggle }), " ", sign, ` ${solver}`);
   });
-  const numbers = [...new Set(runs.map((run) => run.number))].sort((a, b) => a - b);
   const run = choice("Run", [["", "all"], ...numbers.map((one) => [one, one])], state.run, (value) => {
     state.run = value;
     emit("filter");
   });
-  fill(byId("choices"), comparisons.length > 1 ? which : null, element("div", { class: "bar", role: "group", "aria-label": "Solvers" }, boxes), run);
+  fill(byId("choices"), comparisons.length > 1 ? which : null, element("div", { class: "bar", role: "group", "aria-label": kind === "fronts" ? "Fronts" : "Solvers" }, boxes), numbers.length > 1 ? run : null);
 }
-
-begin();

@@ -13,10 +13,10 @@ function pointTraces(axes, type, marker3d) {
   const many = shown.length > MANY;
   const size = many ? 5 : SIZE;
   const traces = [];
+  const template = hoverTemplate();
   const trace = (points, name, marker, more = {}) => {
-    const made = { type, mode: "markers", name, marker, hovertemplate: "%{text}<extra></extra>", ...more };
-    made.text = points.map(hoverText);
-    made.customdata = points.map((point) => point.key);
+    const made = { type, mode: "markers", name, marker, hovertemplate: template, ...more };
+    made.customdata = points.map(hoverData);
     for (const [letter, i] of Object.entries(axes)) made[letter] = points.map((point) => point.values[i]);
     return made;
   };
@@ -54,11 +54,30 @@ function pointTraces(axes, type, marker3d) {
   return traces;
 }
 
+/** The points so far of runs that have not ended, as crosses; they cannot be selected. */
+function goingTraces(axes, type, marker3d) {
+  return state.comparison.solvers.flatMap((solver, k) => {
+    const runs = shownGoing().filter((run) => run.solver === solver);
+    if (!runs.length) return [];
+    const symbol = marker3d ? "x" : "x-thin";
+    const marker = { size: marker3d ? 3 : 6, symbol, color: colorOf(k), opacity: 0.8, ...(marker3d ? {} : { line: { width: 1.2, color: colorOf(k) } }) };
+    const text = runs.flatMap((run) => run.objectives[0].map(() => `${plotText(solver)}, run ${run.number}, so far`));
+    const made = { type, mode: "markers", name: `${plotText(solver)}, so far`, marker, text, hovertemplate: "%{text}<extra></extra>", meta: "going" };
+    for (const [letter, i] of Object.entries(axes)) made[letter] = runs.flatMap((run) => run.objectives[i]);
+    return [made];
+  });
+}
+
+/** The runs that have not ended and have points so far, of the solvers and the run that are shown. */
+const shownGoing = () =>
+  (state.going[state.comparison.id] ?? []).filter((run) => isShown({ solver: run.solver, run }) && run.objectives[0]?.length);
+
 const colorbar = (i) => ({
   title: { text: plotText(withUnit(state.comparison.goals[i].name, state.comparison.goals[i].unit)), side: "right" },
   thickness: 12,
   outlinewidth: 0,
   exponentformat: "power",
+  minexponent: 7,
 });
 
 /** Least and greatest value. */
@@ -93,14 +112,15 @@ function referenceTraces(x, y) {
 function drawTwo(place) {
   const { goals } = state.comparison;
   const { x, y } = view;
-  const type = HAS_GL && shownPoints().length > MANY ? "scattergl" : "scatter";
-  const traces = [...referenceTraces(x, y), ...pointTraces({ x, y }, type, false)];
+  const type = shownPoints().length > MANY && hasGl() ? "scattergl" : "scatter";
+  const traces = [...referenceTraces(x, y), ...goingTraces({ x, y }, "scatter", false), ...pointTraces({ x, y }, type, false)];
   const figure = layout({
     height: 440,
-    xaxis: axis(goalLabel(goals[x])),
-    yaxis: axis(goalLabel(goals[y])),
+    // Where somebody has zoomed in, that stays as long as the axes are the same.
+    xaxis: axis(goalLabel(goals[x]), { uirevision: `${state.comparison.name} ${x}` }),
+    yaxis: axis(goalLabel(goals[y]), { uirevision: `${state.comparison.name} ${y}` }),
     dragmode: "select",
-    modebar: { orientation: view.color === "solver" ? "v" : "h" }, // beside the figure is the scale of colours
+    modebar: { orientation: view.color === "solver" ? "v" : "h", uirevision: "same" }, // beside the figure is the scale of colours
     selections: [],
     showlegend: legendWanted(traces),
     newselection: { line: { color: INK, width: 1, dash: "dot" } },
@@ -111,8 +131,8 @@ function drawTwo(place) {
 function drawThree(place) {
   const { goals } = state.comparison;
   const { x, y, z } = view;
-  const traces = pointTraces({ x, y, z }, "scatter3d", true);
-  const space = (i) => ({ title: { text: plotText(withUnit(goals[i].name, goals[i].unit)) }, exponentformat: "power", gridcolor: "#ccc", color: INK });
+  const traces = [...goingTraces({ x, y, z }, "scatter3d", true), ...pointTraces({ x, y, z }, "scatter3d", true)];
+  const space = (i) => ({ title: { text: plotText(withUnit(goals[i].name, goals[i].unit)) }, exponentformat: "power", minexponent: 7, gridcolor: "#ccc", color: INK });
   const scene = { xaxis: space(x), yaxis: space(y), zaxis: space(z), uirevision: `${x} ${y} ${z}`, camera: { eye: { x: 1.8, y: 1.8, z: 0.9 } } };
   const figure = layout({ height: 520, scene, modebar: { orientation: "h" }, margin: { l: 0, r: 0, t: 60, b: 0 }, showlegend: legendWanted(traces) });
   draw(place, traces, figure);
@@ -124,7 +144,7 @@ const legendWanted = (traces) => traces.filter((trace) => trace.showlegend !== f
 /** What a click or a rectangle in the figure does. The figure forgets this where its kind changes. */
 function listenToScatter(place) {
   place.on("plotly_click", (event) => {
-    const key = event.points.map((point) => point.customdata).find((one) => typeof one === "string");
+    const key = event.points.map((point) => point.customdata?.[0]).find(Boolean);
     if (key) select(key);
   });
   place.on("plotly_selected", (event) => {

@@ -13,19 +13,54 @@ const state = {
   ranges: [], // of each objective [least, greatest], or null
   hidden: new Set(), // solvers
   run: "", // number of the run that is shown; "": all
+  going: {}, // of each comparison the points so far of runs that have not ended
 };
 
-const listeners = { comparison: [], filter: [], selection: [] };
+const listeners = { comparison: [], filter: [], selection: [], renewal: [] };
 const on = (event, listener) => listeners[event].push(listener);
 const emit = (event) => listeners[event].forEach((listener) => listener());
 
-/** Show a comparison from its beginning: nothing selected, nothing hidden. */
-function showComparison(comparison) {
+function take(comparison) {
   state.comparison = comparison;
   state.points = comparison.runs.flatMap((run) => pointsOf(run));
   state.byKey = new Map(state.points.map((point) => [point.key, point]));
+}
+
+/** Show a comparison from its beginning: nothing selected, nothing hidden. */
+function showComparison(comparison) {
+  take(comparison);
   Object.assign(state, { selected: null, kept: [], ranges: comparison.goals.map(() => null), hidden: new Set(), run: "" });
   emit("comparison");
+}
+
+/** Show newer data. Of the comparison that is shown all that was chosen stays: selection, kept points, ranges, solvers and run. */
+function renew(data) {
+  state.data = data;
+  const same = data.comparisons.find((one) => one.id === state.comparison?.id);
+  if (!same || same.goals.length !== state.comparison.goals.length) {
+    if (data.comparisons.length) showComparison(data.comparisons[0]);
+    return;
+  }
+  const chosen = selectedPoint();
+  take(same);
+  state.kept = state.kept.filter((key) => state.byKey.has(key));
+  if (!state.byKey.has(state.selected)) state.selected = null;
+  emit("renewal");
+  // Another run in the same place has other trajectories.
+  if (selectedPoint()?.run.version !== chosen?.run.version) emit("selection");
+}
+
+const loaded = new Map();
+
+/** The details of all points of a run, once they are asked for: a promise of a list. */
+function details(run) {
+  const key = `${run.block} ${run.version ?? ""}`;
+  if (!loaded.has(key)) {
+    const found = readDetails(run);
+    loaded.set(key, found);
+    found.catch(() => loaded.delete(key));
+  }
+  return loaded.get(key);
 }
 
 /** The points of a run, each with its values in the order of the objectives. */
@@ -104,5 +139,6 @@ const inWords = (point) =>
 /** The name of a point: of one run its number, of several solver and run before it. */
 function pointName(point) {
   if (state.data.kind === "front") return `Point ${point.index}`;
+  if (state.data.kind === "fronts") return `${point.solver}, point ${point.index}`;
   return `${point.solver}, run ${point.run.number}, point ${point.index}`;
 }

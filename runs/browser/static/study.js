@@ -1,26 +1,40 @@
 "use strict";
 // What a study has beside its points: the state of its runs, comparisons of solvers as figures, and tables.
 
+let figuresShown = "";
+
 function showStudy() {
-  if (state.data.kind === "front") return;
-  showProgress();
-  const { attainment, convergence, tables } = state.comparison;
-  const parts = [];
+  if (state.data.progress) showProgress();
+  const { name, attainment, convergence, tables } = state.comparison;
   byId("study").hidden = !(attainment || convergence?.length || tables?.length);
-  const place = byId("study-body");
-  place.querySelectorAll(".js-plotly-plot").forEach(retire);
-  if (attainment) parts.push(figureBox("Attainment surfaces", "attainment", "What at least one run (best), half of the runs (median) and all runs (worst) of a solver attain."));
-  if (convergence?.length) parts.push(convergenceBox(convergence));
-  fill(place, parts, (tables ?? []).map(tableElement));
-  if (attainment) drawAttainment(attainment);
-  if (convergence?.length) drawConvergence(convergence, 0);
+  const figures = JSON.stringify([name, Boolean(attainment), convergence?.map((one) => [one.indicator, one.axis])]);
+  if (figures !== figuresShown) buildFigures();
+  figuresShown = figures;
+  fill(byId("study-tables"), (tables ?? []).map(tableElement));
+  if (state.data.note) fill(byId("study-note"), state.data.note);
+  const across = state.data.tables ?? state.measures?.tables ?? [];
+  byId("across").hidden = !across.length;
+  fill(byId("across-tables"), across.map(tableElement));
+  redrawStudy();
 }
 
-/** Draw the figures anew once other solvers are shown. */
+/** Empty places for the figures that there are. */
+function buildFigures() {
+  const { attainment, convergence } = state.comparison;
+  const place = byId("study-figures");
+  place.querySelectorAll(".plot").forEach(retire);
+  const parts = [];
+  if (attainment) parts.push(figureBox("Attainment surfaces", "attainment", "What at least one run (best), half of the runs (median) and all runs (worst) of a solver attain."));
+  if (convergence?.length) parts.push(convergenceBox(convergence));
+  fill(place, parts);
+}
+
+/** Draw the figures. */
 function redrawStudy() {
+  if (!canDraw()) return;
   const { attainment, convergence } = state.comparison;
   if (attainment) drawAttainment(attainment);
-  if (convergence?.length) drawConvergence(convergence, Number(byId("study-body").querySelector("select").value));
+  if (convergence?.length) drawConvergence(convergence, Number(byId("study-figures").querySelector("select").value));
 }
 
 /** A heading, a note and an empty place for a figure. */
@@ -38,10 +52,15 @@ function showProgress() {
   const line = `${progress.finished} of ${counted(progress.total, "run")} finished`;
   fill(byId("headline"), progress.failed ? `${line}, ${progress.failed} failed` : line);
   const bar = element("meter", { min: 0, max: progress.total, value: progress.finished, "aria-label": line });
-  const failures = progress.failures.map((one) =>
-    element("details", {}, element("summary", {}, `${one.name}: ${one.reason}`), one.traceback ? element("pre", {}, one.traceback) : "There is no traceback."),
+  fill(byId("progress-body"), element("p", {}, bar, ` ${line}`), tableElement({ caption: "", heads, rows, words, notes: [] }), failuresList(progress.failures));
+}
+
+/** Failures with their tracebacks, to be unfolded. */
+function failuresList(failures) {
+  const shown = failures.map((one) =>
+    element("details", { "data-name": one.name }, element("summary", {}, `${one.name}: ${one.reason}`), one.traceback ? element("pre", {}, one.traceback) : "There is no traceback."),
   );
-  fill(byId("progress-body"), element("p", {}, bar, ` ${line}`), tableElement({ caption: "", heads, rows, words, notes: [] }), failures.length ? element("h3", {}, "Failures") : null, failures);
+  return shown.length ? [element("h3", {}, "Failures"), ...shown] : [];
 }
 
 function tableElement({ caption, heads, rows, words, notes }) {
@@ -65,13 +84,13 @@ function drawAttainment(surfaces) {
       traces.push({ x, y, mode: "lines", name: label, line: { ...line, color: colorOf(solverIndex(solver)) }, hovertemplate: `${label.replace(/[{}%]/g, "")}<extra></extra>` });
     }
   }
-  const figure = layout({ height: 440, xaxis: axis(goalLabel(goals[0])), yaxis: axis(goalLabel(goals[1])), showlegend: true, legend: { x: 1.02, y: 1 } });
-  draw(byId("attainment"), traces, figure);
+  const figure = layout({ height: 440, xaxis: axis(goalLabel(goals[0])), yaxis: axis(goalLabel(goals[1])), uirevision: "same", modebar: { orientation: "h" }, showlegend: true, legend: { x: 1.02, y: 1 } });
+  drawWhenSeen(byId("attainment"), traces, figure);
 }
 
 function convergenceBox(all) {
   const options = all.map((one, k) => [k, `${one.indicator} over ${one.axis}`]);
-  const chosen = choice("Figure", options, 0, (value) => drawConvergence(all, Number(value)));
+  const chosen = choice("Figure", options, 0, redrawStudy);
   return figureBox("Convergence", "convergence", "Lines are medians of the runs, bands their quartiles; of the points as claimed.", element("div", { class: "bar" }, chosen));
 }
 
@@ -79,7 +98,8 @@ function drawConvergence(all, k) {
   const { indicator, axis: cost, larger, solvers } = all[k];
   const traces = [];
   const positive = Object.values(solvers).flatMap((one) => one.median).filter((value) => value > 0);
-  const log = !larger && positive.length > 0;
+  const decades = Math.max(...positive) / Math.min(...positive);
+  const log = !larger && decades > LEAST_LOG;
   const ends = Math.max(...Object.values(solvers).map((one) => one.x.at(-1)));
   for (const [solver, { runs, x, lower, median, upper }] of Object.entries(solvers)) {
     if (state.hidden.has(solver)) continue;
@@ -93,10 +113,12 @@ function drawConvergence(all, k) {
     const line = { shape: "hv", width: 2, color, dash: DASHES[index % DASHES.length] };
     traces.push({ x: times, y: last(median), mode: "lines", line, name: `${plotText(solver)}, ${counted(runs, "run")}`, hovertemplate: "%{y:.3g} at %{x:.4g}<extra></extra>" });
   }
-  const vertical = axis(`${indicator} (normalised)`, log ? { type: "log", ...logTicks(Math.max(...positive) / Math.min(...positive)) } : {});
-  draw(byId("convergence"), traces, layout({ height: 400, xaxis: axis(cost), yaxis: vertical, legend: { x: 1.02, y: 1 }, showlegend: true }));
+  const vertical = axis(`${indicator} (normalised)`, log ? { type: "log", ...logTicks(decades) } : {});
+  drawWhenSeen(byId("convergence"), traces, layout({ height: 400, xaxis: axis(cost), yaxis: vertical, uirevision: k, modebar: { orientation: "h" }, legend: { x: 1.02, y: 1 }, showlegend: true }));
   byId("convergence").setAttribute("aria-label", `${indicator} over ${cost}, ${Object.keys(solvers).join(", ")}`);
 }
+
+const LEAST_LOG = 4; // ratio of the values below which a logarithmic axis would have hardly a number on it
 
 /** Of less than two decades plain numbers at 1, 2 and 5 of each, else powers of ten. */
 const logTicks = (ratio) => (ratio > 100 ? { dtick: 1 } : { dtick: "D2", tickmode: "linear", exponentformat: "none", tickformat: ".2~r" });

@@ -60,7 +60,7 @@ function showTable() {
   showPages(pages, order.length);
   const unverified = shownPoints().filter((point) => !counts(point)).length;
   const marked = unverified ? ` ${unverified} not verified, in italics and hollow in figures.` : "";
-  fill(byId("table-note"), `${counted(order.length, "point")} of ${state.points.length}. A click on a title sorts.${marked}`);
+  fill(byId("table-note"), state.points.length === 0 ? "There is no point yet." : `${counted(order.length, "point")} of ${state.points.length}. A click on a title sorts.${marked}`);
 }
 
 function headCell(one, k) {
@@ -108,10 +108,16 @@ function pressed(event) {
 
 /** One row can be reached by the tabulator key; arrow keys move to the others. */
 function focusRow(row) {
+  if (!row) return;
   row.parentNode.querySelectorAll('tr[tabindex="0"]').forEach((other) => other.setAttribute("tabindex", "-1"));
   row.setAttribute("tabindex", "0");
-  row.focus();
+  row.focus({ preventScroll: isSeen(row) });
 }
+
+const isSeen = (row) => {
+  const { top, bottom } = row.getBoundingClientRect();
+  return top >= 0 && bottom <= window.innerHeight;
+};
 
 /** Mark the selected row; turn to its page if it is on another. */
 function markRow() {

@@ -2,6 +2,7 @@
 // Numbers, labels and elements. All texts of users go through `element` (as text, never as HTML) or `plotText`.
 
 const MINUS = "\u2212";
+const DIGIT_SPACE = "\u2007", POINT_SPACE = "\u2008"; // as wide as a digit and as a point
 
 /** A number with some significant digits; "-" where there is none. */
 function number(value, digits = 6) {
@@ -30,11 +31,17 @@ function column(values) {
   let decimals = 5 - decade(largest);
   if (span > 1e-9 * largest) decimals = Math.max(decimals, 3 - decade(span));
   decimals = Math.min(Math.max(decimals, 0), 11 - decade(largest));
-  return values.map((value) => (Number.isFinite(value) ? (value + 0).toFixed(decimals).replace(/^-/, MINUS) : "-"));
+  // Numbers with fewer than five digits have more decimals, unless they are round-off of the largest; decimal points stay below each other.
+  const small = (value) => Number.isFinite(value) && value !== 0 && Math.abs(value) >= 1e-6 * largest;
+  const own = values.map((value) => (small(value) ? Math.max(decimals, 4 - decade(Math.abs(value))) : decimals));
+  const width = Math.max(decimals, ...own);
+  const rest = (n) => (n === 0 && width > 0 ? POINT_SPACE : "") + DIGIT_SPACE.repeat(width - n);
+  return values.map((value, k) => (Number.isFinite(value) ? (value + 0).toFixed(own[k]).replace(/^-/, MINUS) + rest(own[k]) : "-"));
 }
 
 const withUnit = (name, unit) => (unit ? `${name} [${unit}]` : name);
-const counted = (count, what) => `${count.toLocaleString("en").replace(/,/g, "\u202f")} ${what}${count === 1 ? "" : "s"}`;
+const grouped = (count) => count.toLocaleString("en").replace(/,/g, "\u202f");
+const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 
 /** The limits of a quantity in words. */
 function limitsText(lower, upper) {
@@ -70,6 +77,18 @@ const byId = (id) => document.getElementById(id);
 /** Replace what is in an element. */
 function fill(place, ...children) {
   place.replaceChildren(...children.flat().filter((child) => child !== null && child !== undefined));
+}
+
+/** Build a part of the page anew; what has the focus in it keeps it. */
+function rebuilt(place, build) {
+  const active = document.activeElement;
+  if (!place.contains(active)) return build();
+  const all = () => [...place.querySelectorAll("button, input, select, summary, [tabindex]")];
+  const row = active.closest("tr[data-key]")?.dataset.key, position = all().indexOf(active);
+  build();
+  if (place.contains(document.activeElement)) return;
+  if (row) focusRow([...place.querySelectorAll("tr[data-key]")].find((one) => one.dataset.key === row) ?? null);
+  else all()[position]?.focus({ preventScroll: true });
 }
 
 /** A label with a select element; `options` are pairs of value and text. */

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 import errno
 import gzip
 import io
@@ -17,7 +18,7 @@ import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from synthetic_fronts import black_box, compiled, empty, flights, marked, state_problem
+from synthetic_fronts import black_box, compiled, empty, flights, marked, state_problem, with_optional_phase
 
 import problems
 from macs import MACS
@@ -746,27 +747,75 @@ def test_a_front_takes_its_own_problem_and_no_other(tmp_path):
 # Tables of values
 
 
+TIMES = ["climb: t0 [s]", "climb: tf [s]", "coast: t0 [s]", "coast: tf [s]"]
+
+
+def table(path: Path) -> tuple[list[str], list[list[str]]]:
+    head, *rows = csv.reader(path.open(encoding="utf-8"))
+    return head, rows
+
+
+def floats(rows: list[list[str]], first: int, end: int) -> np.ndarray:
+    return np.array([[float(cell) for cell in row[first:end]] for row in rows])
+
+
 def test_csv_names_units_and_keeps_every_bit(tmp_path):
     front = flights(3)
     front.to_csv(tmp_path / "front.csv")
-    lines = (tmp_path / "front.csv").read_text(encoding="utf-8").splitlines()
-    assert lines[0] == "time [s],height [km],violation,status," + ",".join(f"climb.u[{i}] [km/s²]" for i in range(4))
-    cells = [line.split(",") for line in lines[1:]]
-    assert same(np.array([[float(c) for c in row[:2]] for row in cells]), front.objectives)
-    assert same(np.array([[float(c) for c in row[4:]] for row in cells]), front.decision)
+    head, rows = table(tmp_path / "front.csv")
+    assert head == ["point", "time [s]", "height [km]", "verified", "status", "mass", *TIMES, "violation"]
+    assert [row[0] for row in rows] == ["0", "1", "2"] and [row[3:5] for row in rows] == [["", "converged"]] * 3
+    assert same(floats(rows, 1, 3), front.objectives)
+    ends = [[t for phase in point.trajectory.phases for t in (phase.t0, phase.tf)] for point in front]
+    assert same(floats(rows, 5, 10), np.column_stack([[point.parameters["mass"] for point in front], ends]))
 
 
 def test_csv_has_what_a_simulation_found(tmp_path):
     front = marked(flights(3), [True, False, False], [True, True, False])
     front.to_csv(tmp_path / "front.csv")
-    lines = (tmp_path / "front.csv").read_text(encoding="utf-8").splitlines()
-    heads = 'defect,"time, simulated [s]","height, simulated [km]","violation, simulated",verified,'
-    assert lines[0].startswith("time [s],height [km],violation,status," + heads)
-    cells = [line.split(",") for line in lines[1:]]
-    assert [row[8] for row in cells] == ["yes", "no", ""] and [row[4] for row in cells] == ["1e-05", "1e-05", ""]
-    assert same(np.array([[float(c) for c in row[5:7]] for row in cells[:2]]), 1.01 * front.objectives[:2])
-    assert cells[2][4:9] == [""] * 5 and [row[7] for row in cells[:2]] == ["1e-06"] * 2
-    assert same(np.array([[float(c) for c in row[9:]] for row in cells]), front.decision)
+    head, rows = table(tmp_path / "front.csv")
+    assert head[10:] == ["violation", "defect", "time, simulated [s]", "height, simulated [km]", "violation, simulated"]
+    assert [row[3] for row in rows] == ["yes", "no", ""] and [row[11] for row in rows] == ["1e-05", "1e-05", ""]
+    assert same(floats(rows[:2], 12, 14), 1.01 * front.objectives[:2])
+    assert rows[2][11:] == [""] * 4 and [row[14] for row in rows[:2]] == ["1e-06"] * 2
+
+
+def test_csv_of_points_without_trajectories(tmp_path):
+    front = black_box(3)
+    front.to_csv(tmp_path / "front.csv")
+    head, rows = table(tmp_path / "front.csv")
+    assert head == ["point", "f0 [kg]", "f1", "verified", "status", "span [m]", "chord [m]", "twist", "violation"]
+    assert same(floats(rows, 5, 8), front.decision)
+    front[1].to_csv(tmp_path / "one.csv")
+    assert table(tmp_path / "one.csv") == (head, [["0", *rows[1][1:]]])
+    failed = flights(2).replace(trajectories=[None, flights(2).trajectories[1]])
+    failed.to_csv(tmp_path / "failed.csv")
+    assert table(tmp_path / "failed.csv")[1][0][5:10] == [""] * 5
+
+
+def test_csv_of_a_trajectory_is_its_history(tmp_path):
+    point = flights(3)[1]
+    point.to_csv(tmp_path / "flight.csv")
+    head, rows = table(tmp_path / "flight.csv")
+    assert head == ["phase", "time [s]", "h [km]", "v [km/s]", "u [km/s²]", "load"]
+    climb, coast = point.trajectory.phases
+    count = len(climb.time)
+    assert [row[0] for row in rows] == ["climb"] * count + ["coast"] * len(coast.time)
+    assert same(floats(rows[:count], 1, 6), np.column_stack([climb.time, climb.states, climb.controls, climb.paths]))
+    assert same(floats(rows[count:], 1, 3), np.column_stack([coast.time, coast.states]))
+    assert all(row[3:] == [""] * 3 for row in rows[count:]), "the coast has no speed and no control"
+
+
+@pytest.mark.parametrize(("length", "known"), [(2.0, True), (-3.7e-6, False)])
+def test_csv_has_costates_of_phases_with_a_length(tmp_path, length, known):
+    trajectory, costates = with_optional_phase(length)
+    front = flights(1).replace(trajectories=[trajectory], costates=[costates])
+    front[0].to_csv(tmp_path / "flight.csv")
+    head, rows = table(tmp_path / "flight.csv")
+    assert head[6:] == ["costate of h [per km]", "costate of v [per km/s]", "Hamiltonian [per s]"]
+    climb = len(trajectory["climb"].time)
+    assert same(floats(rows[:climb], 6, 9), np.column_stack([costates["climb"].at_nodes, costates["climb"].hamiltonian]))
+    assert [bool(row[6]) for row in rows[climb:]] == [known] * (len(rows) - climb)
 
 
 def test_what_a_simulation_found_comes_back(tmp_path):

@@ -5,14 +5,16 @@ import subprocess
 import sys
 import warnings
 from itertools import pairwise
+from pathlib import Path
+from unittest.mock import ANY
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from synthetic_fronts import black_box, empty, flights, marked
+from synthetic_fronts import black_box, empty, flights, marked, with_optional_phase
 
-from macs.fronts.pictures.flight_plot import _dense
+from macs.fronts.pictures.flight_plot import _dense, draw_flight
 from macs.fronts.pictures.limits import draw_limits
 from macs.fronts.pictures.style import axis_label, axis_number, blank_figure
 from problems.compiled import Objective, Variable
@@ -88,6 +90,10 @@ def test_points_that_were_not_simulated_are_drawn_in_full():
     ax = front.plot()
     assert np.array_equal(ax.collections[0].get_offsets(), front.objectives[:2])
     assert "not verified" not in told(flights(3).plot())
+    titles = [one.plot().get_title(loc="left") or one.plot().get_title() for one in (front, flights(3), black_box(3))]
+    assert [title.endswith(", 3 points, not simulated") for title in titles] == [False, True, False]
+    said = [point.plot()[0].figure.get_suptitle().endswith("; not simulated") for point in (front[0], front[1])]
+    assert said == [True, False]
 
 
 def test_infeasible_and_unverified_points_have_words_of_their_own():
@@ -141,6 +147,46 @@ def test_a_point_is_drawn_with_all_it_has():
     draw(axes[0].figure)
     figure = blank_figure()
     assert point.plot(figure)[0].figure is figure
+
+
+@pytest.mark.parametrize("length", [-3.7e-6, 2e-6])
+def test_a_phase_without_length_has_no_costates_and_the_picture_says_so(length):
+    *_, costate, hamiltonian = axes = draw_flight(*costated(length))
+    assert max(np.nanmax(np.abs(ax.lines[0].get_ydata())) for ax in (costate, hamiltonian)) <= 1.0
+    assert [len([line for line in ax.lines if len(line.get_xdata()) > 2]) for ax in (costate, hamiltonian)] == [2, 2], "lines and dots"
+    assert np.abs([*costate.get_ylim(), *hamiltonian.get_ylim()]).max() < 10.0
+    figure = hamiltonian.figure
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["climb", "coast (no length)"]
+    assert axes[4].get_title("right") == "no costates of coast: without length"
+    axes = draw_flight(*costated(1.0))
+    assert [text.get_text() for text in axes[0].figure.legends[0].get_texts()] == ["climb", "coast"]
+    assert axes[4].get_title("right") == ""
+
+
+def costated(length: float):
+    """Arguments of `draw_flight`."""
+    trajectory, costates = with_optional_phase(length)
+    return trajectory, "", blank_figure(), costates
+
+
+def test_costates_are_drawn_only_if_asked_for():
+    trajectory, costates = with_optional_phase(2.0)
+    point = flights(1).replace(trajectories=[trajectory], costates=[costates])[0]
+    assert len(point.plot()) == 4
+    assert [ax.get_ylabel() for ax in point.plot(costates=True)][4:] == ["costate of h\n[per\N{NO-BREAK SPACE}km]", ANY, ANY]
+
+
+def test_a_path_instead_of_a_figure_is_refused_with_the_remedy(tmp_path):
+    front, box = flights(3), black_box()
+    for call, remedy in (
+        (lambda: front.plot("x.png"), "front.plot().figure.savefig('x.png')"),
+        (lambda: front[1].plot("x.png"), "front[1].plot()[0].figure.savefig('x.png')"),
+        (lambda: box.plot_variables(Path("x.png")), "front.plot_variables()[0].figure.savefig('x.png')"),
+        (lambda: box[2].plot("x.png"), "front[2].plot()[0].figure.savefig('x.png')"),
+    ):
+        with pytest.raises(ValueError, match="drawn into a figure, not into a file") as refused:
+            call()
+        assert str(refused.value).endswith(remedy)
 
 
 def test_controls_jump_where_their_polynomials_do():
@@ -245,14 +291,45 @@ def test_long_labels_stay_beside_their_panels():
 
 
 @pytest.mark.parametrize(
-    ("unit", "shown"), [("m2/s3", "m²/s³"), ("1/m2", "1/m²"), ("N^2 s", "N^2 s"), ("t CO2", "t CO2"), ("m s^-2", "m s⁻²"), ("%", "%")]
+    ("unit", "shown"),
+    [
+        ("m2/s3", "m²/s³"),
+        ("1/m2", "1/m²"),
+        ("N^2 s", "N² s"),
+        ("N2 m2 s", "N² m² s"),
+        ("t N2", "t N2"),
+        ("t CO2", "t CO2"),
+        ("m s^-2", "m s⁻²"),
+        ("%", "%"),
+    ],
 )
 def test_powers_of_units_are_raised(unit, shown):
     assert axis_label("x", unit).replace("\N{NO-BREAK SPACE}", " ") == f"x [{shown}]"
 
 
-def test_numbers_beside_axes_have_no_powers_of_ten():
-    assert [axis_number(value) for value in (17344.2, -0.5, 1234.5, 999999.0, 2e6)] == ["17344", "−0.5", "1234", "999999", "2e+06"]
+def test_numbers_beside_axes_have_no_powers_of_ten_below_ten_millions():
+    values = (17344.2, -0.5, 1234.5, 999999.0, 1.5e6, 2e7, -3e-5)
+    assert [axis_number(value) for value in values] == ["17344", "−0.5", "1234", "999999", "1500000", "2×10⁷", "−3×10⁻⁵"]
+
+
+def test_legend_and_table_have_the_same_numbers():
+    front = black_box(3, 2, F=np.array([[5.35104, 700.0], [67069.2, 300.0], [835267.4, 12.0142]]))
+    ax, table = front.plot(), front.table()
+    for value in ("5.3510", "835267"):
+        assert value in table.split()
+    assert [text.get_text().split(" (")[0] for text in ax.get_legend().get_texts()] == ["best f0: 5.3510 kg", "best f1: 12.014"]
+
+
+def test_round_off_of_a_constant_objective_is_no_picture():
+    """As colour, along an axis, and among parallel coordinates."""
+    noise = 2.9 + 1e-12 * np.arange(4)
+    three = black_box(4, 3, F=np.column_stack([np.arange(4.0), 4.0 - np.arange(4), noise]))
+    ax = three.plot()
+    assert ax.figure.axes[1].get_ylim() == pytest.approx((2.61, 3.19)) and len({tuple(c) for c in ax.collections[0].get_facecolors()}) == 1
+    ax = black_box(4, 2, F=np.column_stack([np.arange(4.0), noise])).plot()
+    assert ax.get_ylim() == pytest.approx((2.61, 3.19))
+    lines = black_box(4, 4, F=np.column_stack([np.arange(4.0), noise, np.arange(4.0), -np.arange(4.0)])).plot().lines
+    assert {line.get_ydata()[1] for line in lines if len(line.get_ydata()) == 4} == {1.0}
 
 
 def test_one_point_of_one_objective_has_whole_numbers_below():

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from macs.pareto.archive import Archive, insert, least_violated
@@ -198,6 +198,7 @@ def test_what_an_archive_keeps_has_less_energy_by_the_exponent_that_is_given():
         assert energies[np.ix_(kept[own], kept[own])].sum() < energies[np.ix_(kept[other], kept[other])].sum()
 
 
+@settings(max_examples=30)
 @given(st.integers(2, 3), st.integers(0, 2**32 - 1), st.booleans())
 def test_no_exchange_of_one_point_for_another_lowers_the_energy(m, seed, begun):
     """But for the best of each objective, which stay."""

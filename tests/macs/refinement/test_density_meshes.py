@@ -15,7 +15,7 @@ from transcription.trajectories.simulate import simulate
 
 def refined(problem, method, **more):
     """The optimum of the first objective, and the same with its mesh refined."""
-    point = optimize(problem, method)
+    point = optimize(problem, method, starts=1)
     assert point.status == "converged"
     return point, Front.of(point.alone()).refine_mesh(**more)[0]
 
@@ -120,7 +120,7 @@ def test_a_search_refines_the_intervals_of_its_points():
 def test_without_a_transcription_the_problems_own_intervals_are_refined():
     problem = swinging()
     problem.default_transcription = "multiple-shooting:12:linear"
-    point = optimize(problem, objective="effort")
+    point = optimize(problem, objective="effort", starts=1)
     assert point.verified and point.note == ""
     method = method_of(point)
     assert isinstance(method, MultipleShooting) and method.mesh_of("up").elements > 12
@@ -128,6 +128,6 @@ def test_without_a_transcription_the_problems_own_intervals_are_refined():
 
 def test_splines_that_leave_their_bounds_become_straight_lines():
     problem = swinging((-1.5, 1.5))
-    spline = optimize(problem, MultipleShooting(16, control="spline"), objective="time")
+    spline = optimize(problem, MultipleShooting(16, control="spline"), objective="time", starts=1)
     fine = Front.of(spline.alone()).refine_mesh(tolerance=1e-3, limit=3)[0]
     assert spline.excursions and method_of(fine).control == "linear" and not fine.excursions

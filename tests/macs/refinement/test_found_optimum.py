@@ -34,6 +34,7 @@ def back_to_the_side() -> Problem:
     return problem
 
 
+@pytest.mark.slow
 def test_other_starts_find_a_better_optimum():
     """From the first start of this seed alone the car goes round the wrong way."""
     record = published("dubins")[0]
@@ -43,13 +44,10 @@ def test_other_starts_find_a_better_optimum():
     stats = best.alone().stats
     assert stats["starts"] > stats["found"] >= 1 and stats["optima"] >= 2
     assert alone.alone().stats["starts"] == 1
-    stats = best.alone().stats
-    assert stats["starts"] > stats["found"] >= 1 and stats["optima"] >= 2
-    assert alone.alone().stats["starts"] == 1
 
 
 def test_the_same_seed_gives_the_same_bits_from_several_starts():
-    one, two = (optimize(load("standard/stirred_tank"), seed=4) for _ in range(2))
+    one, two = (optimize(load("standard/stirred_tank"), starts=4, seed=4) for _ in range(2))
     assert np.array_equal(one.decision, two.decision)
 
 
@@ -61,7 +59,7 @@ def test_what_no_solve_reached_is_not_called_converged():
     v = trip.control("v", bounds=(0, 1))
     trip.dynamics(x=v)
     problem.minimize("effort", trip.integral(v**2))
-    point = optimize(problem)
+    point = optimize(problem, starts=2)
     assert point.status != "converged" and not point.verified and "no solve converged" in point.note
 
 
@@ -74,9 +72,9 @@ def test_feasible_but_not_optimal_is_not_called_converged():
     trip.dynamics(x=v)
     problem.minimize("cost", trip.integral((ca.cosh(x - 3) - 1) ** 2 + v**2))
     trip.guess(x=0, v=0)
-    point = optimize(problem, max_iterations=1)
+    point = optimize(problem, starts=1, max_iterations=1)
     assert point.violation <= 1e-6 and point.status == "failed"
-    assert optimize(problem).status == "converged"
+    assert optimize(problem, starts=1).status == "converged"
 
 
 def test_an_objective_that_is_constant_has_no_scale_of_rounding():

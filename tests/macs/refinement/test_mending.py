@@ -24,7 +24,7 @@ LEAST = np.sqrt(2.0 * 10.0 * (1.0 / (4e-3 - 1.6e-3) + 1.0 / (4e-3 + 1.6e-3)))
 @pytest.fixture(scope="module")
 def marked() -> Front:
     """Three points of the ascent's front; at its least time the polynomials of the thrust's angle leave their bounds."""
-    return sweep(load("goddard"), MESH, points=3)
+    return sweep(load("goddard"), MESH, points=3, starts=1)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_ends_keep_their_places_when_they_are_mended():
     problem.maximize("end", phase.final(x))
     problem.minimize("time", phase.tf)
     problem.default_transcription = "dfet:2x1:bernstein"
-    given, ends = payoff(problem, DFET(2, 1, basis="bernstein")), payoff(problem)
+    given, ends = payoff(problem, DFET(2, 1, basis="bernstein"), starts=1), payoff(problem, starts=1)
     assert not given.verified.any() and ends.verified[0] and len(ends) == 2
     assert ends[0].simulated["end"] > ends[1].simulated["end"] + 1e-3
     assert ends[1].objectives["time"] == pytest.approx(3.0) and ends[0].objectives["time"] > 3.5
@@ -137,7 +137,7 @@ def test_points_of_shooting_are_moved_inside_their_limits():
 
 def test_points_that_exceed_a_limit_by_little_keep_their_mesh():
     """The same on elements, whose states are exact: only between nodes is the height too large."""
-    rough = sweep(bryson_denham(), DFET(6, 3), points=4, verify=1e-5)
+    rough = sweep(bryson_denham(), DFET(6, 3), points=4, verify=1e-5, starts=1)
     again = rough.mended()
     assert rough.verified.sum() == 1 and rough.simulated_violation.max() < 1e-3 and again.verified.all() and len(again) == 4
     for point in again:
@@ -162,7 +162,7 @@ def test_an_empty_front_stays_empty_and_keeps_its_reason(fine):
 
 def test_a_fine_mesh_is_for_all_points_and_each_is_simulated_once(monkeypatch):
     """All verified already on the mesh of the search, and solved on the fine one all the same; nothing else is simulated."""
-    front = sweep(load("goddard"), DFET(8, 6), points=3)
+    front = sweep(load("goddard"), DFET(8, 6), points=3, starts=1)
     seen, simulate_all = [], verified.simulate_all
     monkeypatch.setattr(verified, "simulate_all", lambda problem, some, **about: seen.extend(some) or simulate_all(problem, some, **about))
     found = mending.mended(unmarked(front), 1e-3, fine=DFET(9, 7))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import signal
 
 import casadi as ca
@@ -90,20 +89,9 @@ def test_meshes_go_through_files_and_are_verified(tmp_path, fine):
     for one, two in zip(fine, again, strict=True):
         assert np.array_equal(one.decision, two.decision) and one.variables == two.variables and one.note == two.note
     assert all(check.ok for check in verify(again, tolerance=2e-4))
-    fine.to_csv(tmp_path / "fine.csv")
-    rows = list(csv.reader((tmp_path / "fine.csv").open()))
-    assert len(rows[0]) == 4 + len(fine.variables)
-    for row, point in zip(rows[1:], fine, strict=True):
-        assert [float(cell) for cell in row[4:] if cell] == sorted_by_column(fine, point)
     dataset = fine.to_xarray()
     times = dataset["decision"].sel(variable="ascent.tf").values
     assert times == pytest.approx([point.trajectory["ascent"].tf for point in fine], rel=1e-14)
-
-
-def sorted_by_column(front: Front, point) -> list[float]:
-    columns = {v: i for i, v in enumerate(front.variables)}
-    order = np.argsort([columns[v] for v in point.variables])
-    return point.decision[order].tolist()
 
 
 def test_points_of_different_meshes_merge_and_start_a_search(coarse, fine):
@@ -214,8 +202,8 @@ def test_what_has_no_mesh_of_ours_is_refused():
 
 
 def test_a_search_may_refine_its_meshes_in_the_end():
-    front = MACS(mesh="adaptive", mesh_tolerance=1e-5, archive=3).solve(load("orbit_rise"), DFET(5, 2), evaluations=200, seed=1)
-    assert front.stats["gradient_solves"] >= len(front) > 0 and front.stats["evaluations"] == 200
+    front = MACS(mesh="adaptive", mesh_tolerance=1e-5, archive=3).solve(load("orbit_rise"), DFET(5, 2), evaluations=60, seed=1)
+    assert front.stats["gradient_solves"] >= len(front) > 0 and front.stats["evaluations"] == 60
     assert front.solver["settings"]["mesh"] == "adaptive" and "mesh tolerance" in front.message
     assert max(point.simulate(rtol=1e-11).max_defect for point in front if not point.note) < 1e-5
     assert sum(not point.note for point in front) >= len(front) - 1

@@ -52,7 +52,7 @@ def bounded_layer_cost(x: float, most: float) -> float:
 def test_a_front_keeps_its_ends_however_far_a_finer_mesh_moves_them(span):
     problem = layers(1.0, None, 1000.0, span)
     problem.minimize("miss", (problem.phases["run"].final(problem.phases["run"]["x"]) - 1.5) ** 2)
-    coarse = sweep(problem, DFET(30, 4), points=3)
+    coarse = sweep(problem, DFET(30, 4), points=3, starts=1)
     exact = layer_costs(1.0)[0], layer_costs(1.0)[0] + bounded_layer_cost(1.5, span)
     assert coarse.F[-1, 1] < 1e-12 and coarse.F[0, 0] > 1.3 * exact[0], "the coarse mesh has both ends wrong, but it has them"
     fine = coarse.refine_mesh()
@@ -70,7 +70,7 @@ def test_a_front_keeps_its_ends_however_far_a_finer_mesh_moves_them(span):
 @pytest.mark.parametrize(("span", "transcription"), [(50.0, "dfet:40x3:bernstein:1"), (5.0, "dfet:40x3:bernstein:1"), (50.0, "dfet:20x3")])
 def test_an_optimum_is_only_certified_if_it_is_one(span, transcription):
     """Bounds ten times as wide as needed hide an error that is divided by them; a control of order 1 hides its own suboptimality."""
-    point = optimize(layers(1.5, 1.0, 50.0, span), parse(transcription))
+    point = optimize(layers(1.5, 1.0, 50.0, span), parse(transcription), starts=1)
     exact = layer_costs(1.5)[0] + layer_costs(1.0)[1]
     assert abs(point.F[0] / exact - 1) > 1e-2
     fine = point.alone().refine_mesh()
@@ -85,7 +85,7 @@ def test_an_objective_near_zero_is_not_judged_by_its_own_size():
     u = run.control("u", bounds=(-3, 3))
     run.dynamics(x=u - ca.sin(3 * x))
     problem.minimize("miss", (run.final(x) - 1.0) ** 2 + 1e-2 * run.integral((u - 1) ** 2) * (run.final(x) - 1.0) ** 2)
-    fine = optimize(problem, DFET(3, 3)).alone().refine_mesh()
+    fine = optimize(problem, DFET(3, 3), starts=1).alone().refine_mesh()
     assert fine.F[0, 0] < 1e-10 and fine.message.startswith("1 of 1") and fine[0].note == ""
 
 
@@ -113,7 +113,7 @@ def keeps_what_came_in(seed: int) -> None:
     rng = np.random.default_rng(seed + 1000)
     problem = random_problem(seed)
     method = DFET(int(rng.integers(2, 6)), int(rng.integers(1, 4)), basis=str(rng.choice(["lobatto", "bernstein"])))
-    coarse = sweep(problem, method, points=4)
+    coarse = sweep(problem, method, points=4, starts=1)
     fine = coarse.refine_mesh(tolerance=1e-5)
     assert len(fine) == len(coarse) > 0
     span = np.maximum(np.ptp(fine.F, axis=0), 1e-4)
@@ -153,7 +153,7 @@ def test_what_no_simulation_can_follow_is_said_to_be_that():
     u = run.control("u", bounds=(-5, 5))
     run.dynamics(x=x + u)
     problem.minimize("effort", run.integral(u**2))
-    fine = optimize(problem, DFET(20, 4)).alone().refine_mesh(tolerance=1e-6)
+    fine = optimize(problem, DFET(20, 4), starts=1).alone().refine_mesh(tolerance=1e-6)
     assert fine[0].simulate().max_defect > 1.0
     assert fine.F[0, 0] == pytest.approx(2.0, rel=1e-6) and fine.message.startswith("1 of 1")
     assert fine[0].note.startswith("unstable: open-loop simulation cannot follow (errors grow by")
@@ -197,7 +197,7 @@ def test_where_solves_fail_in_one_basis_the_other_is_tried(monkeypatch, fails):
 
 def test_a_control_of_low_order_gets_what_a_mixed_constraint_needs():
     """On 20 Bernstein elements of linear controls the mixed constraint of Rayleigh's problem costs 8e-4 of the objective."""
-    point = optimize(load("standard/rayleigh"), parse("dfet:20x3:bernstein:1"))
+    point = optimize(load("standard/rayleigh"), parse("dfet:20x3:bernstein:1"), starts=1)
     fine = point.alone().refine_mesh(tolerance=1e-5)
     value = published("rayleigh")[0]
     assert abs(point.F[0] - value.value) > 1e-2 and value.met(fine.F[0, 0])
@@ -229,7 +229,7 @@ def test_a_mesh_is_found(name):
 def test_short_pulses_that_a_coarse_mesh_cannot_show_are_found():
     """Twelve switches, of pulses down to 0.06 of 11.9 seconds. Without some of them, simulations and finer meshes of the same kind agree on
     11.54; an independent mesh, of 200 equal elements with constant controls, has 11.4689."""
-    point = optimize(random_problem(4), objective="miss")
+    point = optimize(random_problem(4), objective="miss", starts=1)
     assert point.verified and point.note == "" and point.simulated["miss"] < 11.4689
 
 

@@ -201,7 +201,11 @@ def press() -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
-@pytest.mark.parametrize("number", [1, 5, 9, 20, 38])
+SOLVES = [1, 9, 38, *(pytest.param(number, marks=pytest.mark.slow) for number in (5, 20))]
+"""Gradient solves within which a polish is stopped: of the ends, of the places between them, and late."""
+
+
+@pytest.mark.parametrize("number", SOLVES)
 def test_killed_in_the_polish(file, monkeypatch, number) -> None:
     whole = solved()  # before anything is counted
     with monkeypatch.context() as patch, pytest.raises(MemoryError):
@@ -213,7 +217,7 @@ def test_killed_in_the_polish(file, monkeypatch, number) -> None:
     assert solving.count == whole.stats["gradient_solves"] - (number - 1)  # that one was not finished
 
 
-@pytest.mark.parametrize("number", [1, 5, 9, 20, 38])
+@pytest.mark.parametrize("number", SOLVES)
 @pytest.mark.parametrize("kept", [True, False])
 def test_interrupted_in_the_polish(file, monkeypatch, number, kept) -> None:
     whole = solved()  # before anything is counted

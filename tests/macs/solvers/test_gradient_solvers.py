@@ -21,7 +21,10 @@ def goddard():
 
 
 def test_they_find_what_the_tools_find(goddard):
-    for own, tool in ((solver("payoff"), payoff(goddard, METHOD)), (solver("sweep", points=4), sweep(goddard, METHOD, points=4))):
+    for own, tool in (
+        (solver("payoff", starts=1), payoff(goddard, METHOD, starts=1)),
+        (solver("sweep", points=4, starts=1), sweep(goddard, METHOD, points=4, starts=1)),
+    ):
         front = own.solve(goddard, METHOD, evaluations=10, seed=0)
         np.testing.assert_array_equal(front.objectives, tool.objectives)
         assert "stopped" not in front.stats and front.stats["evaluations"] == 0
@@ -29,9 +32,9 @@ def test_they_find_what_the_tools_find(goddard):
 
 
 def test_the_best_of_one_objective(goddard):
-    front = solver("optimum", objective="horizontal speed").solve(goddard, METHOD, seed=0)
+    front = solver("optimum", objective="horizontal speed", starts=1).solve(goddard, METHOD, seed=0)
     assert len(front) == 1 and front[0].objectives["horizontal speed"] == pytest.approx(
-        payoff(goddard, METHOD)[1].objectives["horizontal speed"]
+        payoff(goddard, METHOD, starts=1)[1].objectives["horizontal speed"]
     )
 
 
@@ -44,16 +47,16 @@ def test_without_an_optimum_the_front_is_empty():
 
 def test_meshes_follow_on_request(goddard):
     method = parse("multiple-shooting:8:linear")
-    fixed, dense = (solver("payoff", mesh=mesh).solve(goddard, method, seed=0) for mesh in ("fixed", "density"))
-    mended = solver("payoff", mesh="mended").solve(goddard, METHOD, seed=0)
+    fixed, dense = (solver("payoff", starts=1, mesh=mesh).solve(goddard, method, seed=0) for mesh in ("fixed", "density"))
+    mended = solver("payoff", starts=1, mesh="mended").solve(goddard, METHOD, seed=0)
     assert not fixed.verified[0] and mended.verified.all()
     meshes = [one.trajectory["ascent"].state.edges for one in (fixed[0], dense[0])]
     assert len(meshes[0]) == len(meshes[1]) and np.ptp(np.diff(meshes[1])) > 1.0 > np.ptp(np.diff(meshes[0]))
 
 
 def test_a_start_is_used(goddard):
-    known = solver("payoff").solve(goddard, METHOD, seed=0)
-    again = solver("payoff").solve(goddard, METHOD, seed=0, start=known)
+    known = solver("payoff", starts=1).solve(goddard, METHOD, seed=0)
+    again = solver("payoff", starts=1).solve(goddard, METHOD, seed=0, start=known)
     assert again.stats["inner_iterations"] < known.stats["inner_iterations"]
     np.testing.assert_allclose(again.objectives, known.objectives, rtol=1e-6, atol=1e-6)
 
@@ -74,11 +77,11 @@ def test_settings_out_of_range_are_refused(name, settings, words):
 
 def test_plain_functions_are_refused():
     with pytest.raises(ValueError, match="needs derivatives"):
-        solver("payoff").minimize(lambda X: X, [(0, 1), (0, 1)], evaluations=5)
+        solver("payoff", starts=1).minimize(lambda X: X, [(0, 1), (0, 1)], evaluations=5)
 
 
 def test_no_checkpoint_keeps_them():
-    assert not keeps(solver("payoff"))
+    assert not keeps(solver("payoff", starts=1))
 
 
 def test_on_the_command_line(tmp_path, capsys):

@@ -159,6 +159,35 @@ def test_a_start_of_another_problem_is_refused() -> None:
         MACS().solve(load("orbit_rise"), MESH, evaluations=30, start=[other.closest or other[0]])
 
 
+def test_a_start_of_another_problem_is_refused_before_a_mesh_is_found(monkeypatch) -> None:
+    other = MACS().solve(load("goddard"), DFET(4, 1), evaluations=30, seed=1)
+    monkeypatch.setattr("macs.solvers.solver.search_transcription", lambda *_: pytest.fail("work before the check"))
+    with pytest.raises(ValueError, match="other variables"):
+        MACS().solve(load("orbit_rise"), evaluations=30, start=other)
+    with pytest.raises(ValueError, match="unknown start 'smoth', did you mean smooth"):
+        MACS().solve(load("orbit_rise"), evaluations=30, start="smoth")
+
+
+@pytest.mark.parametrize("mesh", [MESH, DFET(6, 2)])
+def test_a_front_of_other_data_may_begin_a_search(mesh) -> None:
+    def lift(most: float) -> Problem:
+        problem = Problem("lift")
+        phase = problem.phase("up", t0=0, tf=(0.5, 5))
+        v = phase.state("v", bounds=(0, 2), initial=0)
+        a = phase.control("a", bounds=(0, most))
+        phase.dynamics(v=a)
+        problem.minimize("time", phase.tf)
+        problem.maximize("speed", phase.final(v))
+        return problem
+
+    before = MACS(mesh="fixed").solve(lift(2.0), MESH, evaluations=60, seed=1)
+    assert max(point.trajectory["up"]["a"].max() for point in before) > 1.5
+    front = MACS(mesh="fixed").solve(lift(1.0), mesh, evaluations=60, seed=1, start=before)
+    assert len(front) and max(point.trajectory["up"]["a"].max() for point in front) <= 1.0 + 1e-9
+    with pytest.raises(ValueError, match=r"up\.a.* outside its bounds"):
+        MACS().solve(lift(1.0), MESH, evaluations=60, start=before.decision)
+
+
 def test_a_start_of_another_mesh_is_interpolated() -> None:
     coarse = MACS().solve(load("orbit_rise"), DFET(6, 2), evaluations=300, seed=1, inner="projection")
     fine = MACS().solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, start=coarse, inner="projection")
@@ -222,4 +251,4 @@ def test_what_blows_up_in_a_search_is_no_warning():
         for inner in ("propagate", "auto"):
             front = MACS(agents=4, archive=4).solve(problem, SingleShooting(8), evaluations=40, seed=1, inner=inner)
             assert front.message
-        sweep(problem, DFET(3, 2), points=3)
+        sweep(problem, DFET(3, 2), points=3, starts=1)

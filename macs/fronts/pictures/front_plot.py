@@ -1,0 +1,248 @@
+"""Figures of fronts. They need no display: pyplot is used only if the caller gives no Axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import cycle
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from problems.compiled import Objective
+
+from ...io.atomic import write_whole
+from ...io.text import counted, numbers
+from .kinds import NOT_FEASIBLE, NOT_SIMULATED, NOT_VERIFIED, kinds
+from .style import (
+    COLORS,
+    GREY,
+    STYLE,
+    axis_label,
+    axis_number,
+    better,
+    blank_figure,
+    new_figure,
+    raised,
+    rendered,
+    title_and_legend,
+    wrapped,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+FEW = 100
+"""Other points up to this number are drawn as crosses."""
+
+
+SAME = 1e-9
+"""Objectives that differ by less, of their size, are the same but for round-off."""
+
+
+def save_front(front: Any, path: str | PathLike[str]) -> None:
+    """Draw a front into a file; the suffix gives the format."""
+    _write(lambda: front_figure(front), path)
+
+
+def save_picture(what: Any, path: str | PathLike[str], **how: Any) -> None:
+    """Draw what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
+
+    def drawn() -> Any:
+        figure = blank_figure()
+        what.plot(figure=figure, **how)
+        return figure
+
+    _write(drawn, path)
+
+
+def _write(drawn: Callable[[], Any], path: str | PathLike[str]) -> None:
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        figure = drawn()
+    write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
+
+
+def front_figure(front: Any) -> Any:
+    """A figure without a window of a front."""
+    figure = blank_figure()
+    figure.set_size_inches(*_size(front))
+    draw_front(front, figure.add_subplot())
+    return figure
+
+
+def _size(front: Any) -> tuple[float, float]:
+    return (7.0 if len(front.goals) > 3 else 5.5, 4.0)
+
+
+def draw_front(front: Any, ax: Axes | None = None, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
+    """Axes with the objectives of a front.
+
+    One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
+    Axes), more as parallel coordinates. Points that did not converge, and those that a simulation did not confirm, are hollow or broken
+    lines; none of them is marked as best.
+
+    Parameters
+    ----------
+    front : Any
+    ax : Axes, optional
+        Axes to draw into. Default: those of a new figure.
+    marked : numbers of points
+        Points to mark, a colour each, the same as in a picture of their trajectories. Default: of two objectives, the best of each.
+    beside : mapping, optional
+        Name -> two objectives (k, 2) of other points, in the user's units and senses.
+    """
+    import matplotlib
+
+    if len(marked) > len(COLORS):
+        raise ValueError(f"at most {len(COLORS)} points can be marked in a picture, not {len(marked)}")
+    if beside and len(front.goals) != 2:
+        raise ValueError(f"other points are drawn beside those of two objectives, not of {len(front.goals)}")
+
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        if ax is None:
+            ax = new_figure(*_size(front)).add_subplot()
+        if len(front.goals) > 3:
+            _parallel(front, ax, marked)
+        else:
+            _draw_beside(ax, beside or {})
+            _scatter(front, ax, marked)
+        title_and_legend(ax, _title(front))
+    return ax
+
+
+def _draw_beside(ax: Any, beside: Mapping[str, Any]) -> None:
+    """Draw other points: dots so small that many make a line, which may have gaps, or crosses if there are few."""
+    for (name, values), color in zip(beside.items(), cycle(("black", GREY))):
+        many = len(values) > FEW
+        look: dict[str, Any] = {"marker": "o", "ms": 0.9, "mew": 0.0} if many else {"marker": "x", "ms": 5.0}
+        ax.plot(*np.asarray(values, dtype=float).T, ls="none", color=color, zorder=1, **look)
+        ax.plot([], [], "-" if many else "x", color=color, lw=1.0, ms=5.0, label=name)
+
+
+def _title(front: Any) -> str:
+    name = front.source.name if front.source else front.solver.get("name", "")
+    if not len(front):
+        return f"{name}: no feasible point" if name else "no feasible point"
+    said = f", {NOT_SIMULATED}" if front.dynamic and not front.was_simulated.any() else ""
+    return f"{name}, {counted(len(front), 'point')}{said}".lstrip(", ")
+
+
+def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    if not len(front):
+        words = wrapped(front.message, 0.8 * ax.bbox.width / ax.figure.dpi)
+        ax.text(0.5, 0.9, words, transform=ax.transAxes, ha="center", va="top", color=GREY)
+        front = front if front.closest is None else front.closest.alone()
+    values, (good, apart, infeasible) = front.objectives, kinds(front)
+    if values.shape[1] == 1:
+        values = np.column_stack([np.arange(len(values)), values])
+    goals = front.goals if len(front.goals) > 1 else (Objective("point"), *front.goals)
+    if len(front.goals) == 1:
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        ax.set_xlim(-0.5, max(len(values), 1) - 0.5)
+    third = values.shape[1] == 3 and ax.name != "3d"
+    axes = values.T[:2] if third else values.T
+    color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
+    shades = _shades(values[good | apart, 2]) if third and (good | apart).any() else None
+    ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color, norm=shades and shades.norm)
+    rims = shades.to_rgba(values[apart, 2]) if shades else COLORS[0]
+    for rows, name, edge in ((apart, NOT_VERIFIED, rims), (infeasible, NOT_FEASIBLE, GREY)):
+        if rows.any():
+            ax.scatter(*axes[:, rows], s=26, facecolors="none", edgecolors=edge, linewidths=0.9, zorder=2, label=name)
+    if shades:
+        ax.figure.colorbar(shades, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
+    for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
+        getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
+    for axis, column in zip("xyz", axes, strict=False):
+        about = _about(column) if len(column) > 1 else None
+        if about:
+            getattr(ax, f"set_{axis}lim")(*about)
+    for i, edge in zip(marked, COLORS, strict=False):
+        ax.scatter(*axes[:, [i]], zorder=4, label=_values(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
+    if len(front.goals) == 2 and good.sum() > 1 and not len(marked):
+        _mark_extremes(front, ax)
+
+
+def _shades(values: np.ndarray) -> Any:
+    """Colours of the values of a third objective, of points that are not verified, too."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(*(_about(values) or (values.min(), values.max()))), "viridis")
+
+
+def _about(values: np.ndarray) -> tuple[float, float] | None:
+    """Ends of a range about values that are all the same but for round-off; None for others."""
+    finite = values[np.isfinite(values)]
+    size = float(np.abs(finite).max(initial=0.0))
+    if not len(finite) or np.ptp(finite) > SAME * size:
+        return None
+    half = 0.1 * size or 1.0
+    return float(finite.min()) - half, float(finite.max()) + half
+
+
+def _value(front: Any, number: int, k: int) -> str:
+    """An objective of a point with its unit, as tables have it."""
+    text = numbers(front.objectives[:, k])[number].strip()
+    return f"{text} {raised(front.goals[k].unit)}".rstrip()
+
+
+def _values(front: Any, number: int) -> str:
+    """The number of a point and its objectives, for a legend."""
+    values = [_value(front, number, k) for k in range(len(front.goals))]
+    return f"#{range(len(front))[number]}: {', '.join(values)}"
+
+
+def _mark_extremes(front: Any, ax: Any) -> None:
+    """Mark the best point of each of two objectives; the legend has its value."""
+    F = np.where(kinds(front)[0][:, None], front.F, np.inf)
+    for k, goal in enumerate(front.goals):
+        best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
+        x, y = front.objectives[best]
+        text = f"best {goal.name}: {_value(front, best, k)} (#{best})"
+        marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
+        ax.scatter([x], [y], zorder=4, label=text, **marker)
+
+
+def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
+    """Draw parallel coordinates: a vertical axis for each objective, better at the top, and a line for each point. Points that are not
+    feasible or not verified may lie beyond the ends of the axes, which are those of the others."""
+    import matplotlib
+
+    F, values, (good, apart, infeasible) = front.F, front.objectives, kinds(front)
+    finite = np.where(np.isfinite(F) & (good | (not good.any()))[:, None], F, np.nan)
+    if len(front) and not np.isnan(finite).all():
+        best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
+    else:
+        best = worst = np.zeros(F.shape[1])
+    same = worst - best <= SAME * np.maximum(np.abs(worst), np.abs(best))
+    height = np.where(same & np.isfinite(F), 1.0, 1.0 - (F - best) / np.where(same, 1.0, worst - best))
+    shade = matplotlib.colormaps["viridis"]
+    for row in height[good]:
+        ax.plot(row, color=shade(0.85 * row[0]), lw=1.0, alpha=0.85)
+    for rows, name, look in ((apart, NOT_VERIFIED, "--"), (infeasible, NOT_FEASIBLE, ":")):
+        for k, row in enumerate(height[rows]):
+            ax.plot(row, color=GREY, lw=1.0, alpha=0.85, ls=look, label="" if k else name)
+    for i, color in zip(marked, COLORS, strict=False):
+        dashes = "--" if apart[i] else ":" if infeasible[i] else "-"
+        ax.plot(height[i], color=color, lw=2.2, ls=dashes, zorder=4, label=_values(front, i))
+    signs = np.array([goal.sign for goal in front.goals])
+    for k in range(values.shape[1]):
+        ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)
+        for level, value in ((1.015, best[k] * signs[k]), (-0.015, worst[k] * signs[k])):
+            ax.text(k, level, axis_number(value), ha="center", va="bottom" if level > 0.5 else "top", fontsize=8)
+    ax.grid(False)
+    ax.set_xlim(-0.3, len(front.goals) - 0.7)
+    ax.set_ylim(-0.12, 1.12)
+    room = ax.bbox.width / ax.figure.dpi / len(front.goals)
+    names = [f"{wrapped(axis_label(goal.name, goal.unit), room, 8.0)}\n{goal.sense[:3]}" for goal in front.goals]
+    ax.set_xticks(range(len(front.goals)), names)
+    ax.set_yticks([0, 1], ["worst", "best"])
+    ax.tick_params(length=0)
+    for side in ("left", "bottom"):
+        ax.spines[side].set_visible(False)

@@ -1,0 +1,47 @@
+"""Headless Chromium for tests: whether there is one, and questions to a page in it."""
+
+from __future__ import annotations
+
+import shutil
+import time
+
+import pytest
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+NEEDS_CHROMIUM = [
+    pytest.mark.skipif(
+        not (BROWSER and DRIVER), reason="there is no Chromium with its driver on this machine: apt-get install chromium-driver"
+    ),
+    pytest.mark.xdist_group("chromium"),
+]
+
+
+def started():
+    """A browser; to be quit by the caller."""
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = BROWSER
+    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1300,1000", "--use-angle=swiftshader"):
+        options.add_argument(word)
+    options.add_argument("--enable-unsafe-swiftshader")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    driver.set_script_timeout(30)
+    return driver
+
+
+def wait(browser, condition: str) -> None:
+    """Until a condition in the page holds."""
+    for _ in range(600):
+        if browser.execute_script(f"return Boolean({condition})"):
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"not within 30 s: {condition}")
+
+
+def errors(browser) -> list[str]:
+    """What the console has, but for remarks of the driver on software rendering."""
+    return [one["message"] for one in browser.get_log("browser") if one["level"] == "SEVERE" or "Violation" in one["message"]]

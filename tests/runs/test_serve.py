@@ -1,0 +1,418 @@
+"""The server of `macs serve`, asked by http.client: what it answers, whom it answers, and files that change or are wrong under its eyes."""
+
+from __future__ import annotations
+
+import gzip
+import http.client
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from misbehaving import Crashing, Plain, Slow, glide
+from synthetic_fronts import black_box, flights
+from test_study import Inline
+
+from runs import Study
+from runs.batch import progress as progress_module
+from runs.batch.progress import ProgressFile, read_progress
+from runs.batch.store import Store
+from runs.browser.live import source as sources
+from runs.browser.live.server import Server, source_of
+from runs.cli import main
+from runs.execution.samples import Samples
+
+pytest.importorskip("plotly")
+
+
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch):
+    monkeypatch.setattr(sources, "REST", 0.02)
+
+
+def study(**changes) -> Study:
+    solvers = {"plain": Plain(), "broken": Crashing()}
+    return Study("gliders <b>", **({"problems": {"glide": glide()}, "solvers": solvers, "evaluations": 60, "runs": 1, "seed": 1} | changes))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """A study of which one run is finished and one failed; two more of each can be made."""
+    out = tmp_path_factory.mktemp("serve") / "out"
+    study().run(out, executor=Inline())
+    return out
+
+
+@pytest.fixture
+def out(made, tmp_path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "out"))
+
+
+class Client:
+    """Asks a server."""
+
+    def __init__(self, server: Server) -> None:
+        self.server = server
+
+    def ask(self, path: str, method: str = "GET", **headers: str) -> SimpleNamespace:
+        connection = http.client.HTTPConnection("127.0.0.1", self.server.server_address[1], timeout=30)
+        try:
+            connection.putrequest(method, path, skip_host="Host" in headers, skip_accept_encoding=True)
+            for name, value in headers.items():
+                connection.putheader(name.replace("_", "-"), value)
+            connection.endheaders()
+            answer = connection.getresponse()
+            content = answer.read()
+        finally:
+            connection.close()
+        if answer.headers["Content-Encoding"] == "gzip":
+            content = gzip.decompress(content)
+        return SimpleNamespace(status=answer.status, headers=answer.headers, content=content)
+
+    def json(self, path: str):
+        answer = self.ask(path)
+        assert (answer.status, answer.headers["Content-Type"]) == (200, "application/json"), path
+        return json.loads(answer.content)
+
+    def until(self, condition, path: str = "/status.json"):
+        """The first answer of which a condition holds."""
+        ends = time.monotonic() + 20
+        while True:
+            found = self.json(path)
+            if condition(found):
+                return found
+            assert time.monotonic() < ends, found
+            self.json("/status.json")
+            time.sleep(0.02)
+
+
+@contextmanager
+def served(path: Path, trust: bool = False, host: str = "127.0.0.1"):
+    server = Server(source_of(path, trust), host)
+    threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
+    try:
+        client = Client(server)
+        client.until(lambda status: "data" in status["versions"])
+        yield client
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_the_routes_have_what_the_report_has_and_nothing_is_written(out):
+    before = contents(out)
+    with served(out, trust=True) as client:
+        status = client.json("/status.json")
+        assert {key: status[key] for key in ("total", "finished", "failed", "waiting", "running", "alive")} == {
+            "total": 2, "finished": 1, "failed": 1, "waiting": 0, "running": 0, "alive": False
+        }  # fmt: skip
+        data = client.json("/data.json")
+        (comparison,) = data["comparisons"]
+        (run,) = comparison["runs"]
+        front = next(run for run in Store.open(out, trust=True).runs() if run.finished).front
+        assert run["points"]["objectives"] == front.objectives.T.tolist()
+        assert "the root of all evil" in data["failures"][0]["reason"] and "Traceback" in data["failures"][0]["traceback"]
+        details = client.json(f"/details/{run['block']}.json")
+        assert len(details) == len(front) and details[0]["phases"][0]["name"] == "leg"
+        measures = client.until(lambda found: found["finished"] == 1, "/measures.json")
+        assert measures["comparisons"][comparison["id"]]["tables"]
+        page = client.ask("/").content.decode()
+        assert "gliders &lt;b&gt;" in page and "gliders <b>" not in page
+        assert b"function follow" in client.ask("/scripts.js").content and len(client.ask("/plotly.js").content) > 1_000_000
+    assert contents(out) == before
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT", "MACS"])
+def test_only_get_and_head_are_answered(out, method):
+    with served(out) as client:
+        answer = client.ask("/", method)
+        assert (answer.status, answer.headers["Allow"]) == (405, "GET, HEAD")
+
+
+def test_head_has_the_headers_of_get_without_content(out):
+    with served(out) as client:
+        for path in ("/", "/data.json"):
+            got, head = client.ask(path), client.ask(path, "HEAD")
+            assert head.content == b"" and head.headers["Content-Length"] == got.headers["Content-Length"] == str(len(got.content))
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/study.json", "/../study.json", "/details/../study.json", "/details/%2e%2e%2fstudy.json", "/..%2f..%2fetc/passwd",
+     "//etc/passwd", "/static/main.js", "/scripts.js/", "/details/9-1.json", "/details/0-99.json", "/data", "/.progress",
+     "/?/../study.json", "/details/.json"],
+)  # fmt: skip
+def test_no_file_is_served_by_its_path(out, path):
+    with served(out) as client:
+        answer = client.ask(path)
+        assert answer.status == (200 if path.startswith("/?") else 404)
+        assert b"crc32" not in answer.content and b"root:" not in answer.content
+
+
+def test_names_of_other_places_are_refused_where_only_this_machine_is_meant(out):
+    with served(out) as client:
+        port = client.server.server_address[1]
+        for host in ("localhost", "127.0.0.1", f"localhost:{port}", f"LOCALHOST:{port}", "[::1]:80"):
+            assert client.ask("/status.json", Host=host).status == 200, host
+        for host in ("evil.example", f"evil.example:{port}", "localhost.evil.example", "127.0.0.1.evil.example", "", "evil@localhost"):
+            assert client.ask("/status.json", Host=host).status == 403, host
+    with served(out, host="0.0.0.0") as client:
+        assert not client.server.local and client.ask("/status.json", Host="lab.example:80").status == 200
+
+
+def test_every_answer_has_headers_that_keep_other_places_out(out):
+    with served(out) as client:
+        for path, method in (("/", "GET"), ("/data.json", "GET"), ("/nothing", "GET"), ("/", "POST")):
+            headers = client.ask(path, method).headers
+            policy = headers["Content-Security-Policy"]
+            assert "default-src 'none'" in policy and "connect-src 'self'" in policy and "frame-ancestors 'none'" in policy
+            assert "unsafe-inline" not in policy.split("script-src")[1].split(";")[0]
+            assert headers["X-Content-Type-Options"] == "nosniff" and headers["Cross-Origin-Resource-Policy"] == "same-origin"
+            assert "Access-Control-Allow-Origin" not in headers
+
+
+def test_what_has_not_changed_is_not_sent_again(out):
+    with served(out) as client:
+        first = client.ask("/data.json")
+        assert first.headers["ETag"] == f'"{client.json("/status.json")["versions"]["data"]}"'
+        again = client.ask("/data.json", If_None_Match=first.headers["ETag"])
+        assert (again.status, again.content) == (304, b"")
+        assert json.loads(client.ask("/data.json", Accept_Encoding="gzip").content) == json.loads(first.content)
+
+
+def test_a_study_that_grows_is_followed_and_finished_runs_are_not_read_again(out, monkeypatch):
+    with served(out, trust=True) as client:
+        before = client.json("/data.json")
+        read = []
+        original = Store.run
+
+        def run(self, cell, number):
+            read.append((type(self).__name__, number))
+            return original(self, cell, number)
+
+        monkeypatch.setattr(Store, "run", run)
+        looks = client.server.source._looker
+        for _ in range(3):
+            client.json("/status.json")
+            time.sleep(0.05)
+        assert looks.is_alive() and read == []  # nothing has changed
+        study(runs=3).run(out, executor=Inline())
+        status = client.until(lambda status: status["finished"] == 3)
+        assert (status["total"], status["failed"]) == (6, 3)
+        after = client.until(lambda found: len(found["comparisons"][0]["runs"]) == 3, "/data.json")
+        assert after["comparisons"][0]["runs"][0] == before["comparisons"][0]["runs"][0]
+        assert client.json(f"/details/{after['comparisons'][0]['runs'][2]['block']}.json")
+        client.until(lambda found: found["finished"] == 3, "/measures.json")
+    seen = [number for kind, number in read if kind == "CachedStore"]
+    assert seen and len(seen) <= 6 * 3  # the definition changed once, and each file a few times at most
+
+
+def test_files_that_are_damaged_or_gone_are_named_and_the_server_goes_on(out):
+    with served(out) as client:
+        whole = (out / "study.json").read_bytes()
+        (out / "study.json").write_bytes(whole[:100])
+        assert "study.json" in client.until(lambda status: status["trouble"])["trouble"]
+        assert client.json("/data.json")["comparisons"][0]["runs"]  # what was seen before stays
+        (out / "study.json").unlink()
+        assert "no study" in client.until(lambda status: "no study" in status["trouble"])["trouble"]
+        (out / "study.json").write_bytes(whole)
+        client.until(lambda status: not status["trouble"])
+        front = next(out.rglob("*.nc"))
+        half = front.read_bytes()[:1000]
+        front.write_bytes(half)
+        client.until(lambda status: (status["finished"], status["failed"]) == (0, 2))
+        assert any("damaged" in one["reason"] for one in client.until(lambda found: len(found["failures"]) == 2, "/data.json")["failures"])
+        shutil.rmtree(out)
+        assert "there is no folder" in client.until(lambda status: "no folder" in status["trouble"])["trouble"]
+        assert client.ask("/").status == 200
+
+
+def test_a_front_that_goes_away_while_it_is_read_is_named_and_read_at_the_next_look(out, monkeypatch):
+    from runs.browser.live import study as module
+
+    original, gone = module._front_of, [1]
+
+    def front_of(run):
+        if gone and gone.pop():
+            raise FileNotFoundError("it has just gone")
+        return original(run)
+
+    monkeypatch.setattr(module, "_front_of", front_of)
+    with served(out) as client:
+        data = client.until(lambda found: found["comparisons"], "/data.json")
+        assert data["unreadable"] == [] and data["comparisons"][0]["runs"]
+
+
+def test_code_that_only_a_file_names_is_not_run(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "rocket.py").write_text("from misbehaving import glide\ndef build():\n    return glide()\n", encoding="utf-8")
+    solvers = {"plain": Plain()}
+    stated = Study("rocket", problems=f"{tmp_path}/rocket.py:build", solvers=solvers, evaluations=60, runs=1, seed=1, verify=0.5)
+    stated.run(tmp_path / "out", executor=Inline())
+    mark = tmp_path / "it_ran"
+    (tmp_path / "rocket.py").write_text(f"from pathlib import Path\nPath({str(mark)!r}).touch()\n", encoding="utf-8")
+    with served(tmp_path / "out") as client:
+        measures = client.until(lambda found: found["trouble"], "/measures.json")
+        assert "--trust" in measures["trouble"]
+        (run,) = client.json("/data.json")["comparisons"][0]["runs"]
+        assert run["points"]["count"] and client.json(f"/details/{run['block']}.json")
+    assert not mark.exists()
+
+
+def test_the_points_so_far_of_runs_that_have_not_ended_are_shown(out):
+    stated = study(runs=2)
+    cell = stated.cells[0]
+    (run,) = (run for run in Store.open(out).runs(2) if run.cell.labels == cell.labels and run.number == 2)
+    samples = Samples(60, path=run.path.with_suffix(".samples"))
+    counts = {"evaluations": 20, "inner_iterations": 0, "gradient_solves": 0, "work": 0, "gradient_work": 0}
+    samples.note(SimpleNamespace(**counts, elapsed=1.0, F=np.array([[1.0, -3.0], [2.0, -6.0]])))
+    with Store.claim(out, stated.definition()):
+        pass
+    going = [progress_module.Going(cell.folder, 2, 31, 1.5)]
+    with served(out) as client, ProgressFile(out, stated.objectives, lambda: (going, 12.0)) as file:
+        file.refresh()
+        status = client.until(lambda status: status["running"] == 1)
+        assert (status["alive"], status["waiting"], status["left"]) == (True, 1, 12.0)
+        assert status["going"] == [{"name": f"{cell.name}, run 2", "evaluations": 31, "budget": 60, "elapsed": 1.5}]
+        (points,) = client.json("/going.json")["glide, dfet:2x2"]
+        assert points == {"solver": "plain", "number": 2, "objectives": [[1.0, 2.0], [3.0, 6.0]]}  # in the user's senses
+        run.path.with_suffix(".samples").write_bytes(b'{"crc32": 1, "con')  # half written
+        client.until(lambda found: not found["glide, dfet:2x2"], "/going.json")
+        assert not client.json("/status.json")["trouble"]
+    with served(out) as client:
+        assert client.json("/status.json")["alive"] is False and client.json("/going.json") == {"glide, dfet:2x2": []}
+
+
+def test_before_the_first_run_has_ended_the_objectives_are_known(tmp_path):
+    stated = study()
+    with Store.claim(tmp_path / "out", stated.definition()):
+        pass
+    with ProgressFile(tmp_path / "out", stated.objectives, lambda: ([], None)) as file, served(tmp_path / "out") as client:
+        file.refresh()
+        data = client.until(lambda found: found["comparisons"], "/data.json")
+        assert [goal["name"] for goal in data["comparisons"][0]["goals"]] == ["time", "distance"]
+        assert data["comparisons"][0]["runs"] == [] and client.json("/status.json")["waiting"] == 2
+
+
+def test_progress_that_is_old_or_damaged_is_none(tmp_path):
+    assert read_progress(tmp_path) is None
+    file = ProgressFile(tmp_path, {}, lambda: ([], None))
+    file.refresh()
+    assert read_progress(tmp_path) is not None
+    path = tmp_path / progress_module.FILE
+    old = time.time() - 2 * progress_module.STALE
+    os.utime(path, (old, old))
+    assert read_progress(tmp_path) is None
+    path.write_text("{}", encoding="utf-8")
+    assert read_progress(tmp_path) is None
+    file.__exit__(None, None, None)
+    assert not path.exists()
+
+
+def test_a_study_says_how_it_proceeds_and_leaves_nothing_of_that_behind(tmp_path, monkeypatch):
+    monkeypatch.setattr(progress_module, "EVERY", 0.0)
+    told = []
+    original = ProgressFile.refresh
+    monkeypatch.setattr(ProgressFile, "refresh", lambda self: original(self) or told.append(read_progress(tmp_path / "out")))
+    Study("slow", problems={"glide": glide()}, solvers={"slow": Slow()}, evaluations=60, runs=1, seed=1).run(tmp_path / "out")
+    known = [one for one in told if one and one.going]
+    assert known and {run.number for one in known for run in one.going} == {1} and known[0].goals["glide"][0].name == "time"
+    assert not (tmp_path / "out" / progress_module.FILE).exists()
+
+
+def test_fronts_are_followed_one_alone_and_those_of_a_folder(tmp_path):
+    flights(3).save(tmp_path / "first.nc")
+    with served(tmp_path / "first.nc") as client:
+        assert client.json("/data.json")["kind"] == "front"
+        flights(4).save(tmp_path / "first.nc")
+        client.until(lambda found: found["comparisons"][0]["runs"][0]["points"]["count"] == 4, "/data.json")
+        (tmp_path / "first.nc").write_bytes(b"half")
+        assert "first.nc" in client.until(lambda status: status["trouble"])["trouble"]
+        flights(4).save(tmp_path / "first.nc")
+        client.until(lambda status: not status["trouble"])
+    with served(tmp_path) as client:
+        assert client.json("/data.json")["kind"] == "fronts"
+        flights(5, seed=1).save(tmp_path / "second.nc")
+        black_box(4).save(tmp_path / "other.nc")
+        (tmp_path / "text.nc").write_text("no front", encoding="utf-8")
+        data = client.until(lambda found: len(found["comparisons"]) == 2 and found["unreadable"], "/data.json")
+        assert {tuple(one["solvers"]) for one in data["comparisons"]} == {("first", "second"), ("other",)}
+        assert "text.nc" in data["unreadable"][0]
+
+
+def test_wrong_calls_are_one_line(out, tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "text.nc").write_text("no front", encoding="utf-8")
+    taken = Server(source_of(out))
+    calls = (
+        [str(tmp_path / "nothing")],
+        [str(tmp_path / "empty")],
+        [str(tmp_path / "text.nc")],
+        [str(out), "--port", str(taken.server_address[1])],
+        [str(out), "--host", "999.1.1.1"],
+        [str(out), "--host", "192.0.2.1"],
+    )
+    for call in calls:
+        assert main(["serve", *call]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    taken.server_close()
+    for port in ("70000", "-1", "http"):
+        with pytest.raises(SystemExit, match="2"):
+            main(["serve", str(out), "--port", port])
+        assert capsys.readouterr().err.count("\n") == 1
+
+
+@contextmanager
+def process(*call: str):
+    """`macs` in a process of its own, and the address that it prints."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(str(Path(part).resolve()) for part in sys.path)}
+    made = subprocess.Popen(
+        [sys.executable, "-m", "runs.cli", "serve", *call], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    )
+    try:
+        assert made.stdout is not None
+        yield made, made.stdout.readline()
+    finally:
+        made.kill()
+        made.wait()
+
+
+def test_ctrl_c_ends_the_server_quietly_and_an_open_address_is_warned_of(out):
+    with process(str(out), "--port", "0", "--host", "0.0.0.0") as (server, said):
+        assert "http://0.0.0.0:" in said and str(out) in said
+        server.send_signal(signal.SIGINT)
+        rest, complaints = server.communicate(timeout=20)
+        assert (server.returncode, rest) == (0, "") and complaints.count("\n") == 1 and "everybody on the network" in complaints
+
+
+@pytest.mark.slow
+def test_a_study_goes_on_when_its_server_is_killed(tmp_path):
+    stated = Study("slow", problems={"glide": glide()}, solvers={"slow": Slow()}, evaluations=60, runs=4, seed=1)
+    expected = [run.front.F.tolist() for run in stated.run(tmp_path / "alone").runs]
+    found = []
+    runner = threading.Thread(target=lambda: found.append(stated.run(tmp_path / "out")))
+    runner.start()
+    while not (tmp_path / "out" / "study.json").exists():
+        time.sleep(0.01)
+    with process(str(tmp_path / "out"), "--port", "0") as (server, said):
+        port = int(said.split("http://127.0.0.1:")[1].split("/")[0])
+        client = Client(SimpleNamespace(server_address=("127.0.0.1", port)))
+        client.until(lambda status: status.get("running"))
+        server.kill()
+        server.wait()
+        assert runner.is_alive()
+    runner.join()
+    assert [run.front.F.tolist() for run in found[0].runs] == expected and found[0].finished == 4
