@@ -208,7 +208,7 @@ def breed_archive(trials: Trials) -> None:
     fixed."""
     state, settings, evaluator, box = trials.state, trials.settings, trials.evaluator, trials.box
     archive, rng = state.archive, state.rng
-    count = settings.offspring(len(archive), archive.F.shape[1])
+    count = settings.offspring(len(archive), archive.F.shape[1], len(state.agents) - settings.agents)
     if not count:
         return
     rounds = [rng.permutation(len(archive)) for _ in range(-(-count // len(archive)))]
