@@ -110,7 +110,8 @@ class Settings:
         Pattern search tries all coordinates while the archive is empty, and one when it is full (the authors' later code). An iteration
         takes at most an eighth of the budget for it.
     lone : int, optional
-        Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead. So they
+        Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead; in an
+        iteration as many of them act as there are `agents`. So they
         reach parts of the front that the archive, which keeps what is non-dominated at the moment, has lost. Default: one for each 6000
         evaluations of the budget beyond 30 000, at most half as many as the points of `archive` beyond 10, and none with more than three
         objectives. 0 in the paper. There are never more agents than points in the first population.
@@ -306,7 +307,7 @@ class Settings:
         return max(self.agents, min(self.archive, budget // 20)) if self.sample is None else self.sample
 
     def offspring(self, archived: int, m: int, lone: int = 0) -> int:
-        """Number of offspring in an iteration of an archive with so many points, of m objectives, beside `lone` agents without a direction;
+        """Number of offspring in an iteration of an archive with so many points, of m objectives, in which so many lone agents act;
         0 if it is empty."""
         each = (FEW_OBJECTIVES if m <= MANY else MANY_OBJECTIVES) if self.breeding is None else self.breeding
         return max(self.agents + lone, round(each * archived)) if each and archived else 0
