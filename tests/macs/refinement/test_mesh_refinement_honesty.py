@@ -229,7 +229,7 @@ def test_a_mesh_is_found(name):
 def test_short_pulses_that_a_coarse_mesh_cannot_show_are_found():
     """Twelve switches, of pulses down to 0.06 of 11.9 seconds. Without some of them, simulations and finer meshes of the same kind agree on
     11.54; an independent mesh, of 200 equal elements with constant controls, has 11.4689."""
-    point = optimize(random_problem(4), objective="miss", starts=1)
+    point = optimize(random_problem(4), objective="miss")
     assert point.verified and point.note == "" and point.simulated["miss"] < 11.4689
 
 
