@@ -145,8 +145,13 @@ def load(name: str, **data: Any) -> Any:
         known = ", ".join([*(case for case in CASES if not case.startswith(STANDARD)), f"the published problems {STANDARD}..."])
         raise ValueError(f"there is no problem '{name}'{hint} there are {known}; or give 'file.py:function' or 'package.module:function'")
     function = _builder(_file_module(place) if place.endswith(".py") else _named_module(place, name), function_name, name)
-    _check_data(function, name, data)
-    problem = function(**data)
+    stated = _check_data(function, name, data)
+    try:
+        problem = function(**data)
+    except TypeError as error:
+        if stated or not data:
+            raise
+        raise ValueError(f"problem '{name}' does not take {', '.join(data)}: {error}") from error
     if not isinstance(problem, Problem | VectorProblem):
         raise ValueError(f"'{name}' must return a Problem or a VectorProblem, not {type(problem).__name__}")
     if problem.default_evaluations is None and is_catalogued(name):
@@ -172,11 +177,15 @@ def _builder(module: ModuleType, function_name: str, name: str) -> FunctionType:
     return function
 
 
-def _check_data(function: FunctionType, name: str, data: Mapping[str, Any]) -> None:
-    """Raise ValueError, before it is called, for data that the function of a problem does not take, and for those that it lacks."""
+def _check_data(function: FunctionType, name: str, data: Mapping[str, Any]) -> bool:
+    """Raise ValueError, before it is called, for data that the function of a problem does not take, and for those that it lacks.
+
+    Returns whether it states the names of all data that it takes; what hands on any data is known to refuse them when it is called.
+    """
     parameters = inspect.signature(function).parameters.values()
     named = {one.name: one for one in parameters if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)}
-    if not any(one.kind is one.VAR_KEYWORD for one in parameters):
+    stated = not any(one.kind is one.VAR_KEYWORD for one in parameters)
+    if stated:
         for given in data:
             if given not in named:
                 there_are = f": {unknown('data', given, named)}" if named else ", nor any other data"
@@ -184,6 +193,7 @@ def _check_data(function: FunctionType, name: str, data: Mapping[str, Any]) -> N
     lacking = [one for one in named if named[one].default is inspect.Parameter.empty and one not in data]
     if lacking:
         raise ValueError(f"problem '{name}' needs data: {', '.join(lacking)}")
+    return stated
 
 
 def _knows_problems(module: ModuleType) -> bool:

@@ -363,6 +363,11 @@ def check_problem(problem: Any, transcription: Any = None) -> None:
     if not isinstance(problem, Problem | CompiledProblem):
         others = "problems.load makes one from a name, and minimize(...) searches a plain function or a problem of pymoo"
         raise ValueError(f"problem must be a Problem, not {type(problem).__name__}; {others}")
+    check_method(transcription)
+
+
+def check_method(transcription: Any) -> None:
+    """Raise ValueError if this is no transcription; None is one that is to be found."""
     if transcription is not None and not isinstance(transcription, Transcription):
         others = "; transcription.parse makes one from a word" if isinstance(transcription, str) else ""
         raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}{others}")

@@ -8,7 +8,7 @@ from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from problems.vector import CompiledVectorProblem
 from problems.vector_problem import VectorProblem
-from transcription.base import Transcription, check_problem
+from transcription.base import Transcription, check_method, check_problem
 
 from ..fronts.point import Point
 from ..fronts.points import Points
@@ -100,8 +100,7 @@ def check_statement(problem: Any, transcription: Any, preference: Any, start: An
         raise ValueError(
             f"decide needs derivatives, and so a Problem with dynamics, not {type(problem).__name__}; preference.rank(front) needs none"
         )
-    if transcription is not None and not isinstance(transcription, Transcription):
-        raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
+    check_method(transcription)
     if not isinstance(preference, Preference):
         raise ValueError(f"preference must be a Preference such as WeightedSum({{'flight time': 1.0}}), not {preference!r}")
     if start is not None and not isinstance(start, Points | Point):

@@ -14,7 +14,7 @@ from problems.catalogue import is_catalogued
 from problems.checks import check_count
 from problems.compiled import CompiledProblem, Objective
 from problems.problem import Problem
-from transcription.base import Transcription, check_problem
+from transcription.base import Transcription, check_method, check_problem
 from transcription.catalogue import from_dict
 
 from ..evaluation.evaluator import CONVERGED
@@ -112,8 +112,7 @@ class Dialogue:
             check_problem(problem)
             self.problem = front.source.check(problem, "the front")
             front = front.replace(problem=self.problem)
-        if transcription is not None and not isinstance(transcription, Transcription):
-            raise ValueError(f"transcription must be a Transcription such as DFET(elements=4, order=6), not {transcription!r}")
+        check_method(transcription)
         check_count("seed", seed, 0)
         self.front, self.transcription, self.seed = Front.of(front), transcription, int(seed)
         self.ranges = Ranges.of(front) if ranges is None else ranges

@@ -8,9 +8,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..io.text import counted
-from .dominance import nondominated
+from .dominance import nondominated, worthwhile
 from .energy import Guide, spread
 from .niches import MANY, best_of_niches
+
+CURVE = 2
+"""With more than so many objectives, points far from the front can be non-dominated for ever, see `worthwhile`."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,7 +88,8 @@ def insert(
     tolerance : float
         A point with a violation of at most this is feasible.
     exponent : float, optional
-        See `energy.pair_energies`. With more than three objectives, points are chosen by `niches.best_of_niches` unless it is given.
+        See `energy.pair_energies`. Unless it is given, with three objectives points are left out that are not `dominance.worthwhile` where
+        there are too many, and with more than three they are chosen by `niches.best_of_niches`.
     guide : Guide, optional
         See `energy.spread`, by which points are then chosen.
 
@@ -100,9 +104,12 @@ def insert(
         return archive
     every = archive.joined(Archive(Z[offered], F[offered], violation[offered]))
     keep = np.flatnonzero(nondominated(every.F))
+    even = exponent is None and guide is None
+    if len(keep) > limit and even and CURVE < every.F.shape[1] <= MANY:
+        keep = keep[worthwhile(every.F[keep])]
     if len(keep) > limit:
         F = every.F[keep]
-        niches = F.shape[1] > MANY and exponent is None and guide is None
+        niches = even and F.shape[1] > MANY
         keep = keep[best_of_niches(F, limit) if niches else spread(F, limit, keep < len(archive), exponent, guide)]
     return every.take(keep)
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import moocore
 import numpy as np
 
+CHARGE = 0.01
+"""Part of the other objectives, in ranges, that is added to each by `worthwhile`."""
+
 
 def nondominated(F: np.ndarray) -> np.ndarray:
     """Mask (n,) of the non-dominated rows of F (n, m). Of equal rows only the first is kept; a row with NaN never is."""
@@ -17,6 +20,20 @@ def nondominated(F: np.ndarray) -> np.ndarray:
 def dominates(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     """Mask (...,): whether A (..., m) is no worse than B (..., m) in any objective and better in one; leading axes broadcast."""
     return np.all(A <= B, axis=-1) & np.any(A < B, axis=-1)
+
+
+def worthwhile(F: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the non-dominated rows of F (n, m) that are not far worse than another for a little of one objective, and of the best of
+    each objective.
+
+    Each objective is charged the part `CHARGE` of the others, in ranges; points that are then dominated are left out (Ikeda, Kita and
+    Kobayashi 2001). With more than two objectives such points are often far from the front, and others rarely dominate them.
+    """
+    span = np.ptp(F, axis=0)
+    N = F / np.where(span > 0.0, span, 1.0)
+    keep = nondominated((1.0 - CHARGE) * N + CHARGE * N.sum(axis=1, keepdims=True))
+    keep[extremes(F)] = True
+    return keep
 
 
 def constrained_dominates(

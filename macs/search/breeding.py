@@ -208,7 +208,8 @@ def breed_archive(trials: Trials) -> None:
     fixed."""
     state, settings, evaluator, box = trials.state, trials.settings, trials.evaluator, trials.box
     archive, rng = state.archive, state.rng
-    count = settings.offspring(len(archive), archive.F.shape[1])
+    lone = min(max(len(state.agents) - settings.agents, 0), settings.agents)
+    count = settings.offspring(len(archive), archive.F.shape[1], lone)
     if not count:
         return
     rounds = [rng.permutation(len(archive)) for _ in range(-(-count // len(archive)))]

@@ -82,12 +82,23 @@ def distinct_others(agents: np.ndarray, population: int, count: int, rng: np.ran
     return np.argsort(scores, axis=1)[:, np.arange(count) % max(population - 1, 1)].T
 
 
+def acting_agents(count: int, others: int, rng: np.random.Generator) -> np.ndarray:
+    """Rows of the agents that act in an iteration: the first `others`, and of the lone ones after them at most as many, drawn anew.
+
+    Each lone agent may need long, but together they leave most evaluations to what improves the archive.
+    """
+    lone = max(count - others, 0)
+    if lone <= others:
+        return np.arange(count)
+    return np.concatenate([np.arange(others), others + np.sort(rng.choice(lone, others, replace=False))])
+
+
 def individual_actions(trials: Trials) -> None:
-    """Try inertia, pattern search and differential evolution in turn with all agents; each agent stops at its first success."""
+    """Try inertia, pattern search and differential evolution in turn with the agents that act; each stops at its first success."""
     state, settings, box = trials.state, trials.settings, trials.box
     agents, rng = state.agents, state.rng
-    waiting = np.arange(len(agents))
     count, d = len(agents), len(box.lower)
+    waiting = acting = acting_agents(count, settings.agents, rng)
 
     def attempt(propose: Proposal, velocity: bool = True) -> None:
         nonlocal waiting
@@ -115,4 +126,4 @@ def individual_actions(trials: Trials) -> None:
         return differential(box, X, donors, settings.F, settings.CR, rng)
 
     attempt(by_differences, settings.keep_velocity)
-    agents.adapt_radius(trials.credited, settings.rho, settings.contraction, settings.max_contractions)
+    agents.adapt_radius(acting, trials.credited, settings.rho, settings.contraction, settings.max_contractions)

@@ -117,7 +117,8 @@ class MACS(Settings, Solver):
             state.hopeless = HOPELESS
         Z = np.vstack([Z, opening.optima.Z])
         seen = replace(seen, Z=np.where(np.isfinite(seen.Z), seen.Z, Z))  # after a failure, an agent is where its candidate was
-        state.agents = agents_at(seen, _choose(seen, self.agents, evaluator.tolerance, self.exponent, guide), len(evaluator.free), self)
+        chosen = _choose(seen, self.agents + self.lone_agents(m, budget), evaluator.tolerance, self.exponent, guide)
+        state.agents = agents_at(seen, chosen, len(evaluator.free), self)
         assign(state, self, guide)
         return state
 

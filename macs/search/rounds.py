@@ -43,6 +43,8 @@ JOINED = 0.3
 """Points of the front that are farther from a point, in ranges, are not joined by lines beside it: there may be a gap."""
 FLAT = 1e-3
 """Least range of an objective on the front, in that of all feasible agents and points of archives: a front may be one point."""
+ALONE = 0.01
+"""Least range of a single objective, in its size: its front is one point, and starts that end at one optimum have no range."""
 CORNER = 1.1
 """Corner of the hypervolume in each objective, in ranges of the front from its ideal point."""
 DONE, CEILING = "done", "ceiling"
@@ -199,6 +201,8 @@ def _frame(F: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ideal point and ranges (m,) of the best of points with F (k, m), by which a front is normalised."""
     best = F[nondominated(F)]
     span = np.maximum(np.ptp(best, axis=0), FLAT * extent)
+    if F.shape[1] == 1:
+        span = np.maximum(span, ALONE * np.abs(best).max(axis=0))
     return best.min(axis=0), np.where(span > 0.0, span, ranges(best))
 
 

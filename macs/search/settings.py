@@ -18,6 +18,10 @@ from ..preferences.preference import Preference
 
 FEW_OBJECTIVES, MANY_OBJECTIVES = 0.15, 1.0
 """Default of `breeding` with at most three objectives, and with more."""
+FEW_POINTS = 10
+"""Points of an archive up to which, by default, all agents have a direction."""
+LONG, ALONE = 30_000, 6000
+"""Budget up to which, by default, all agents have a direction; evaluations beyond it for each of which there is one without."""
 SHARE = 8
 """Pattern search takes at most this part, one eighth, of the budget in one iteration."""
 LEAST = {"agents": 3, "archive": 1, "max_contractions": 0, "memory": 1, "refine_every": 1, "polish_every": 1, "ceiling": 1}
@@ -105,6 +109,12 @@ class Settings:
     adaptive_coordinates : bool, default True
         Pattern search tries all coordinates while the archive is empty, and one when it is full (the authors' later code). An iteration
         takes at most an eighth of the budget for it.
+    lone : int, optional
+        Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead; in an
+        iteration as many of them act as there are `agents`. So they
+        reach parts of the front that the archive, which keeps what is non-dominated at the moment, has lost. Default: one for each 6000
+        evaluations of the budget beyond 30 000, at most half as many as the points of `archive` beyond 10, and none with more than three
+        objectives. 0 in the paper. There are never more agents than points in the first population.
     directions : int, optional
         Number of directions that those of the agents are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
     redraw : bool, default True
@@ -177,6 +187,7 @@ class Settings:
     max_contractions: int = 5
     coordinates: float = 1.0
     adaptive_coordinates: bool = True
+    lone: int | None = None
     directions: int | None = None
     redraw: bool = True
     reseed: str = "all"
@@ -198,7 +209,7 @@ class Settings:
     def __post_init__(self) -> None:
         for name, least in LEAST.items():
             check_count(f"MACS: {name}", getattr(self, name), least)
-        for name, least in (("directions", 1), ("sample", self.agents)):
+        for name, least in (("directions", 1), ("lone", 0), ("sample", self.agents)):
             if getattr(self, name) is not None:
                 check_count(f"MACS: {name}", getattr(self, name), least)
         for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):
@@ -265,6 +276,7 @@ class Settings:
             "social_moves": False,
             "keep_velocity": False,
             "breeding": 0.0,
+            "lone": 0,
             "exponent": 2.0,
         }
         paper = cls(**(settings | overrides))
@@ -275,6 +287,12 @@ class Settings:
     def refines(self) -> bool:
         """Whether the search makes gradient solves on its own transcription."""
         return self.refine and self.polish_on is None
+
+    def lone_agents(self, m: int, budget: int) -> int:
+        """Number of agents without a direction beside `agents`, for m objectives, if the first population has points enough."""
+        if self.lone is not None:
+            return self.lone
+        return min(max(self.archive - FEW_POINTS, 0) // 2, max(budget - LONG, 0) // ALONE) if m <= MANY else 0
 
     def coordinates_to_scan(self, d: int, archived: int, m: int, budget: int) -> int:
         """Number of the d coordinates that pattern search tries; with m = 1 objective the archive is full with one point."""
@@ -288,10 +306,11 @@ class Settings:
         """Number of points of the first population."""
         return max(self.agents, min(self.archive, budget // 20)) if self.sample is None else self.sample
 
-    def offspring(self, archived: int, m: int) -> int:
-        """Number of offspring in an iteration of an archive with so many points, of m objectives; 0 if it is empty."""
+    def offspring(self, archived: int, m: int, lone: int = 0) -> int:
+        """Number of offspring in an iteration of an archive with so many points, of m objectives, in which so many lone agents act;
+        0 if it is empty."""
         each = (FEW_OBJECTIVES if m <= MANY else MANY_OBJECTIVES) if self.breeding is None else self.breeding
-        return max(self.agents, round(each * archived)) if each and archived else 0
+        return max(self.agents + lone, round(each * archived)) if each and archived else 0
 
     def social_agents(self, m: int) -> int:
         """Number of agents with a direction, for m objectives: 0 if they are too few for all orthogonal directions."""

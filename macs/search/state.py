@@ -65,12 +65,15 @@ class Agents:
         """Move the agents `rows` to evaluated points Z (k, D), F (k, m), violation (k,)."""
         self.Z[rows], self.F[rows], self.violation[rows] = Z, F, violation
 
-    def adapt_radius(self, success: np.ndarray, rho: float, contraction: float, limit: int) -> None:
+    def adapt_radius(self, rows: np.ndarray, success: np.ndarray, rho: float, contraction: float, limit: int) -> None:
         """Contract the radius of agents without success, and expand that of agents with success; at either limit it is reset.
 
         Parameters
         ----------
+        rows : array of int
+            Those that acted.
         success : array (n,) of bool
+            Of all.
         rho : float
             Initial radius, and the one after a reset.
         contraction : float
@@ -78,8 +81,8 @@ class Agents:
         limit : int
             Largest number of contractions. After one more, or an expansion beyond `rho`, the radius is reset.
         """
-        self.contractions += np.where(success, -1, 1)
-        self.rho *= np.where(success, 1.0 / contraction, contraction)
+        self.contractions[rows] += np.where(success[rows], -1, 1)
+        self.rho[rows] *= np.where(success[rows], 1.0 / contraction, contraction)
         anew = (self.contractions < 0) | (self.contractions > limit)
         self.contractions[anew] = 0
         self.rho[anew] = rho

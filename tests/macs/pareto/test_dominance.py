@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs.pareto.dominance import constrained_dominates, dominates, extremes, nondominated
+from macs.pareto.dominance import constrained_dominates, dominates, extremes, nondominated, worthwhile
 
 FRONTS = st.integers(1, 4).flatmap(
     lambda m: arrays(float, st.tuples(st.integers(1, 15), st.just(m)), elements=st.integers(0, 4).map(float))
@@ -63,3 +63,13 @@ def test_feasible_points_are_compared_by_objectives_within_the_tolerance():
 def test_extremes_break_ties_by_the_other_objectives():
     F = np.array([[0.0, 5.0], [0.0, 3.0], [2.0, 1.0], [1.0, 1.0]])
     assert extremes(F).tolist() == [1, 3]
+
+
+def test_points_far_worse_for_a_little_of_one_objective_are_left_out_but_not_the_best():
+    a = np.linspace(0.2, 1.3, 6)
+    F = np.stack([np.cos(a), np.sin(a), np.linspace(0.4, 0.6, 6)], axis=1)
+    least = F[:, 0].min()
+    far = np.vstack([F, [least - 1e-4, 5.0, 5.0], [least - 2e-4, 5.1, 5.1]])
+    assert nondominated(far).all()
+    assert worthwhile(F).all()
+    assert worthwhile(far).tolist() == [True] * 6 + [False, True]

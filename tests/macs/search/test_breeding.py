@@ -158,6 +158,7 @@ def test_how_many_are_sampled_and_bred():
     assert MACS(archive=100).points_to_sample(30_000) == MACS(archive=100, breeding=1).offspring(100, 3) == 100
     assert MACS(archive=100).offspring(100, 3) == 15
     assert MACS(archive=100).offspring(100, 4) == 100
+    assert MACS(archive=100).offspring(100, 3, lone=45) == 55
     assert MACS(archive=100, breeding=0.15).offspring(100, 4) == 15
     assert MACS(archive=100).points_to_sample(500) == 25
     assert MACS(archive=100).points_to_sample(20) == MACS(archive=100).offspring(3, 2) == 10

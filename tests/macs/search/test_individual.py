@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from macs.evaluation.box import Box
 from macs.pareto.directions import pair_up
-from macs.search.individual import coordinate_step, differential, distinct_others, inertia
+from macs.search.individual import acting_agents, coordinate_step, differential, distinct_others, inertia
 from macs.search.social import current_to_rand, nearest
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -125,3 +125,12 @@ def test_the_difference_of_two_agents_is_weighted_by_F():
     assert np.allclose(steps[1.0] / steps[1.0][:, :1], [1.0, -0.5, 0.25]) and (steps[1.0][:, 0] > 0.0).all()
     straight = differential(cube, X, np.stack([X + 0.3, X, X + np.array([0.1, 0.2, 0.0])]), 0.0, 1.0, np.random.default_rng(3)) - X
     assert np.allclose(straight[:, 1], 2.0 * straight[:, 0]) and np.allclose(straight[:, 2], 0.0)
+
+
+def test_as_many_lone_agents_act_as_there_are_others():
+    rng = np.random.default_rng(0)
+    assert acting_agents(10, 10, rng).tolist() == list(range(10)) and acting_agents(20, 10, rng).tolist() == list(range(20))
+    assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state, "nothing is drawn where all act"
+    drawn = [acting_agents(55, 10, rng) for _ in range(200)]
+    assert all(rows.tolist() == sorted(set(rows)) and len(rows) == 20 and rows[:10].tolist() == list(range(10)) for rows in drawn)
+    assert set(np.concatenate(drawn)) == set(range(55)), "each has its turn"

@@ -13,6 +13,7 @@ from plain import dtlz, uf, zdt
 from macs.baselines import NSGA3
 from macs.pareto.dominance import dominates
 from macs.search.macs import MACS
+from macs.search.state import NO_DIRECTION
 from problems.cases.goddard import reference
 
 
@@ -218,6 +219,24 @@ def test_settings_of_the_paper():
     state = run(MACS.paper(), boxed(schaffer, [(-2, 2)] * 3), 600)
     assert len(state.archive) == 10
     assert len(run(MACS.paper(archive=30), boxed(schaffer, [(-2, 2)] * 3), 900).archive) == 30
+
+
+def test_lone_agents_are_as_many_as_the_budget_allows_and_are_never_moved_to_the_archive():
+    budgets = (9_999, 35_999, 36_000, 300_000, 1_000_000)
+    assert [MACS(archive=100).lone_agents(2, budget) for budget in budgets] == [0, 0, 1, 45, 45]
+    assert [MACS(archive=points).lone_agents(3, 1_000_000) for points in (3, 10, 11, 12, 150)] == [0, 0, 0, 1, 70]
+    assert MACS(archive=150).lone_agents(4, 300_000) == MACS.paper(archive=100).lone_agents(2, 300_000) == 0
+    settings, box = MACS(agents=4, archive=20, lone=5), boxed(schaffer, [(-2, 2)] * 3)
+    state = settings.begin(box, 2000, np.random.default_rng(0))
+    first = state.agents.F[4:].copy()
+    assert len(first) == 5
+    while state.evaluations < 2000:
+        settings.advance(state, box, 2000)
+        assert (state.agents.direction[4:] == NO_DIRECTION).all()
+        assert (state.agents.direction[:4] != NO_DIRECTION).all()
+    last = state.agents.F[4:]
+    assert (dominates(last, first) | (last == first).all(axis=1)).all(), "each is compared with itself only"
+    assert (last != first).any()
 
 
 def distances(problem, seeds, evaluations):

@@ -74,6 +74,19 @@ def test_a_front_of_one_point_is_measured_by_what_was_seen():
 # When it ends
 
 
+def test_one_objective_is_measured_by_its_size_where_all_that_was_seen_is_alike():
+    best, nearly, only = np.array([[-40.0]]), np.array([1e-5]), np.ones((1, 1))
+    assert not improves(best - 1e-4, best, nearly, only)
+    assert improves(best - 0.01, best, nearly, only)
+    assert improves(np.array([[-1e-8]]), np.zeros((1, 1)), nearly, only), "of an optimum at 0 what was seen is all there is"
+
+
+def test_one_objective_ends_soon():
+    front = MACS().solve(load("standard/car"), seed=1)
+    assert front.stats["stopped"] == DONE and front.stats["evaluations"] < 2000
+    assert front[0].objectives["time"] == pytest.approx(np.sqrt(2 * 300 * (1 / 1 + 1 / 2)), abs=1e-3)  # 300 m, by up to 1 and -2 m/s2
+
+
 def test_it_ends_after_as_much_without_progress_as_is_stated():
     first = after(Rounds.first(2, 250, 10**6), QUARTER, 250)
     assert first.end == 500 and first.improved == 250 and not first.stopped
