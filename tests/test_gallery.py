@@ -26,7 +26,7 @@ SHORT, LONG = 4, 40
 """Lines of a script."""
 QUICK = ("goddard", "bryson_denham", "car")
 """Scripts that are run here."""
-TO_COME = ("reentry_case2", "reentry_case3", "smv", "aerocapture_codesign")
+TO_COME = ("smv",)
 """Cases whose pages are still to be made."""
 NUMBER = re.compile(r"(?<![\w.#])[\u2212-]?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.]*\w)")
 SMALL = 12

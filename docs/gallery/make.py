@@ -39,7 +39,7 @@ LEARNED = "# What was learned\n"
 LOADED = re.compile(r'load\("([\w/]+)"')
 RESULT, LESSONS = "## Result\n\n", "## What was learned\n\n"
 """Headings of a page."""
-DPI, SHADES, LARGEST, ACROSS = 100, (256, 64, 32), 80_000, 3
+DPI, SHADES, LARGEST, ACROSS = 100, (256, 64, 32, 24), 80_000, 3
 """Of pictures; how many colours they may have; their largest size, bytes; pictures in a row of the index."""
 ALONE = ("problems.cases", "problems.cases.standard")
 """Packages whose modules are problems of their own; a case in another folder is made of all its modules."""
