@@ -15,6 +15,7 @@ from .derived import remembered
 SAMPLES, FEW = 2048, 64
 """Most samples; as many as do where each expression is a number at one of them."""
 ROUNDING = 1e-9
+"""Part of its values up to which a constraint is the same in all samples."""
 Labels = Mapping[str, Sequence[str]]
 
 

@@ -29,7 +29,7 @@ the report says how many."""
 
 
 @dataclass(frozen=True, eq=False)
-class Verified:
+class Counting:
     """The points of a run that count: all of them, or in a study that verifies those that are feasible when simulated.
 
     Their objectives are those of the simulation, so that it does not matter what the solver said of these.
@@ -51,7 +51,7 @@ class Verified:
     feasible: int
 
     @classmethod
-    def of(cls, run: StoredRun, tolerance: float | None) -> Verified:
+    def of(cls, run: StoredRun, tolerance: float | None) -> Counting:
         """The points of a finished run of a study that verifies within a tolerance, or with None not at all.
 
         Points that were not verified within this tolerance, and final states that are not in the run's record, are simulated now. Raises
@@ -87,7 +87,7 @@ class Comparison:
         Its finished runs.
     fronts : {solver: sequence of Front}
         The points of each finished run that count; also the given fronts of foreign solvers.
-    verified : {solver: sequence of Verified}
+    counting : {solver: sequence of Counting}
         The same with the result of their verification.
     failures : {solver: int}
         How many of its runs failed.
@@ -103,7 +103,7 @@ class Comparison:
     transcription: str
     runs: Mapping[str, Sequence[StoredRun]]
     fronts: Mapping[str, Sequence[Front]]
-    verified: Mapping[str, Sequence[Verified]]
+    counting: Mapping[str, Sequence[Counting]]
     failures: Mapping[str, int]
     left_out: Mapping[str, int]
     stated: Any = None
@@ -145,8 +145,8 @@ class Comparison:
 
         In a study that verifies only those feasible when simulated, and so none of foreign solvers, whose points cannot be simulated.
         """
-        verified = [one.front for ones in self.verified.values() for one in ones]
-        fronts = verified if self.verifies else self.every
+        counting = [one.front for ones in self.counting.values() for one in ones]
+        fronts = counting if self.verifies else self.every
         together = union([front if front.source is not None else front.objectives for front in fronts])  # others have no trajectories
         assert isinstance(together, Front)  # as all of them are
         return Reference(together, f"the union of {counted(len(fronts), 'run')}", False)
@@ -185,13 +185,13 @@ def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Com
     Raises
     ------
     ValueError
-        A run's points cannot be verified, see `Verified.of`.
+        A run's points cannot be verified, see `Counting.of`.
     """
     found = []
     for (problem, transcription), solvers in compared(store).items():
         finished = {solver: [run for run in runs if run.finished] for solver, runs in solvers.items()}
-        verified = {solver: [Verified.of(run, store.definition.get("verify")) for run in runs] for solver, runs in finished.items()}
-        fronts: dict[str, Sequence[Front]] = {solver: [one.front for one in ones] for solver, ones in verified.items()}
+        counting = {solver: [Counting.of(run, store.definition.get("verify")) for run in runs] for solver, runs in finished.items()}
+        fronts: dict[str, Sequence[Front]] = {solver: [one.front for one in ones] for solver, ones in counting.items()}
         if not any(fronts.values()):
             continue
         goals = next(front for one in fronts.values() for front in one).goals
@@ -199,5 +199,5 @@ def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Com
         failures = {solver: sum(run.status in FAILED for run in runs) for solver, runs in solvers.items()}
         left_out = {solver: len(runs) - len(finished[solver]) - failures[solver] for solver, runs in solvers.items()}
         stated, verifies = store.definition.get("reference"), store.definition.get("verify") is not None
-        found.append(Comparison(problem, transcription, finished, fronts, verified, failures, left_out, stated, verifies))
+        found.append(Comparison(problem, transcription, finished, fronts, counting, failures, left_out, stated, verifies))
     return found

@@ -20,7 +20,7 @@ def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
     if tolerance is None:
         return {}
     rows: list[list[Cell]] = []
-    for solver, found in comparison.verified.items():
+    for solver, found in comparison.counting.items():
         if not found:
             continue
         claimed, verified, feasible = (sum(getattr(one, name) for one in found) for name in ("claimed", "verified", "feasible"))

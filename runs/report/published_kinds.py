@@ -225,7 +225,7 @@ class Ends(Objectives, tag="ends", kw_only=True):
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         rows: dict[str, list[Figures]] = {}
-        for solver, runs in comparison.verified.items():
+        for solver, runs in comparison.counting.items():
             found = [one for one in runs if len(one.front)]
             if found:
                 values = {end.name: np.concatenate([_final(one.ends, end) for one in found]) - end.at for end in self.ends}
@@ -278,7 +278,7 @@ class Feasibility(Published, tag="feasibility"):
                 figures[f"{key}_median"] = middle if np.isfinite(middle) else None
                 figures[f"{key}_never"] = count - len(reached)
             figures["points"] = float(np.mean([one["nondominated"] for one in populations]))
-            figures["counted"] = float(np.mean([len(one.front) for one in comparison.verified[solver]]))
+            figures["counted"] = float(np.mean([len(one.front) for one in comparison.counting[solver]]))
             rows[solver] = [figures]
         return rows
 

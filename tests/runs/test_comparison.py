@@ -18,7 +18,7 @@ from problems import Problem
 from runs import Study
 from runs.batch.store import Store
 from runs.data.schema import from_record, to_record
-from runs.report.comparison import Verified, comparisons
+from runs.report.comparison import Counting, comparisons
 from runs.report.published import papers, published_tables
 
 ENDS = [{"name": "miss", "state": "x", "at": 2.0, "unit": "cm", "factor": 100.0}, {"name": "speed", "state": "v", "at": 0.0}]
@@ -71,7 +71,7 @@ def test_only_points_that_are_feasible_when_simulated_count(folder):
     problem = braking()
     counts = np.zeros(3, dtype=int)
     for solver, runs in comparison.runs.items():
-        for run, front, counted in zip(runs, comparison.fronts[solver], comparison.verified[solver], strict=True):
+        for run, front, counted in zip(runs, comparison.fronts[solver], comparison.counting[solver], strict=True):
             claims = Front.load(run.path, problem)
             simulated = claims.simulate(tolerance=0.01, rtol=1e-10, atol=1e-11)
             defects = np.array([point.simulate(rtol=1e-10, atol=1e-11).max_defect for point in claims])
@@ -100,10 +100,10 @@ def test_runs_of_old_are_simulated_by_the_report(folder, tmp_path):
         record.write_bytes(to_record({**from_record(record.read_bytes()), "front": crc32(run.path.read_bytes())}))
     for run in (runs := list(store.runs())):
         run.__dict__["front"] = Front.load(run.path, braking())
-        found = Verified.of(run, 0.01)
+        found = Counting.of(run, 0.01)
         known = next(
             v
-            for s, vs in expected.verified.items()
+            for s, vs in expected.counting.items()
             for r, v in zip(expected.runs[s], vs, strict=True)
             if r.path.name == run.path.name and s == run.cell.solver
         )
@@ -118,7 +118,7 @@ def test_the_report_says_how_many_were_claimed(folder):
     comparison = comparisons(Store.open(folder), {})[0]
     with (folder / "report" / "braking-dfet-1x2-claims.csv").open() as file:
         rows = {row["solver"]: row for row in csv.DictReader(file)}
-    for solver, runs in comparison.verified.items():
+    for solver, runs in comparison.counting.items():
         assert int(rows[solver]["points claimed"]) == sum(one.claimed for one in runs)
         assert int(rows[solver]["verified"]) == sum(one.verified for one in runs)
         defects = np.concatenate([run.front.defect for run in comparison.runs[solver]])
@@ -128,7 +128,7 @@ def test_the_report_says_how_many_were_claimed(folder):
 def test_published_ends_and_feasibility_beside_ours(folder):
     study().report(folder, figures=False)
     comparison = comparisons(Store.open(folder), {})[0]
-    x = np.concatenate([one.ends["run"]["x"] for one in comparison.verified["nsga2"]])
+    x = np.concatenate([one.ends["run"]["x"] for one in comparison.counting["nsga2"]])
     with (folder / "report" / "published-1.csv").open() as file:
         rows = {(row["by"], row["statistic"]): row for row in csv.DictReader(file)}
     assert rows["the paper", "mean"]["miss [cm]"] == "5.0"
@@ -148,7 +148,7 @@ def test_without_flights_points_are_what_the_solver_says(tmp_path):
     given = study(verify=None)
     given.run(tmp_path / "out", executor=Inline())
     comparison = comparisons(Store.open(tmp_path / "out"), {})[0]
-    for run, verified in zip(comparison.runs["macs"], comparison.verified["macs"], strict=True):
+    for run, verified in zip(comparison.runs["macs"], comparison.counting["macs"], strict=True):
         np.testing.assert_array_equal(verified.front.F, run.front.F)
         np.testing.assert_array_equal(verified.ends["run"]["x"], [p.trajectory["run"].edge_states[-1, 0] for p in run.front])
     assert "claimed" not in str(given.report(tmp_path / "out", figures=False)).replace("not dominated, claimed", "")

@@ -150,7 +150,7 @@ def test_unions_hold_only_what_a_simulation_found(place, tmp_path):
     joined.save(run.path)
     run.path.with_suffix(".json").unlink()
     [after] = comparisons(Store.open(tmp_path / "out"), {})
-    assert after.verified["plain"][0].claimed == before.verified["plain"][0].claimed + 1
+    assert after.counting["plain"][0].claimed == before.counting["plain"][0].claimed + 1
     np.testing.assert_array_equal(after.union().front.F, before.union().front.F)
     # Confirmed, it would be the whole union.
     nothing = np.zeros(len(joined))

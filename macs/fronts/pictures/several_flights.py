@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .flight_plot import PANEL, Drawn, draw_panel, quantities
-from .kinds import remark
+from .kinds import hollow, remark
 from .style import COLORS, STYLE, axis_label, new_figure, plain, raised, wrapped
 
 
@@ -38,7 +38,7 @@ def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
     without = [point.index for point in points if point.trajectory is None]
     if without:
         raise ValueError(f"point {without[0]} has no trajectory: its problem has none, or its evaluation failed")
-    drawn = [Drawn(point.trajectory, color, bool(remark(point))) for point, color in zip(points, COLORS, strict=False)]
+    drawn = [Drawn(point.trajectory, color, hollow(point)) for point, color in zip(points, COLORS, strict=False)]
     over = sorted(drawn, key=lambda one: one.trajectory.phases[-1].tf, reverse=True)
     panels = list(dict.fromkeys(panel for one in drawn for panel in quantities(one.trajectory)))
     columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
@@ -69,7 +69,7 @@ def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
 
 
 def _words(point: Any) -> str:
-    """The point's number, its objectives, and whether it is not verified or not feasible."""
+    """The point's number, its objectives, and whether it is not feasible, not verified or not simulated."""
     named = zip(point.goals, point.objectives.values(), strict=True)
     values = ", ".join(f"{goal.name} {value:.5g} {raised(goal.unit)}".rstrip() for goal, value in named)
     said = remark(point)

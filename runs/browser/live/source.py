@@ -1,4 +1,4 @@
-"""What a server shows, and threads that look at its files as long as somebody wants to see them."""
+"""What a server shows, and threads that read its files again and again while a page asks for them."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Resource:
 
 @dataclass(frozen=True)
 class View:
-    """What was seen at one look.
+    """What one reading of the files gave.
 
     Attributes
     ----------

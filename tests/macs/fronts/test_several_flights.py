@@ -40,6 +40,10 @@ def test_dots_are_ends_of_phases_and_hollow_nodes_of_what_is_not_verified():
     assert hollow and {to_hex(line.get_color()).upper() for line in hollow} == {COLORS[1]}
     words = [text.get_text() for text in axes[0].figure.legends[0].get_texts()]
     assert "not verified" not in words[0] and words[1].endswith("not verified")
+    # What was not simulated is said, but drawn in full, as by a point's own picture.
+    axes = flights(3).plot_trajectories([0, 1])
+    assert all(to_hex(line.get_markerfacecolor()) != "#ffffff" for line in axes[0].lines if line.get_marker() == "o")
+    assert all(text.get_text().endswith("not simulated") for text in axes[0].figure.legends[0].get_texts())
 
 
 @pytest.mark.parametrize(
