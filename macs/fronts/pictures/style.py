@@ -52,19 +52,33 @@ def new_figure(width: float, height: float) -> Any:
     try:
         from matplotlib import pyplot
 
-        return pyplot.figure(figsize=(width, height), layout="constrained")
+        figure = pyplot.figure(figsize=(width, height), layout="constrained")
     except ImportError:
         # The backend of the environment needs a display or a toolkit that is not available.
-        from matplotlib.figure import Figure
+        return blank_figure(width, height)
+    figure.add_axobserver(_number_plainly)
+    return figure
 
-        return Figure(figsize=(width, height), layout="constrained")
 
-
-def blank_figure() -> Any:
+def blank_figure(width: float = 5.5, height: float = 4.0) -> Any:
     """A figure without a window, for files."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(5.5, 4.0), layout="constrained")
+    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.add_axobserver(_number_plainly)
+    return figure
+
+
+def _number_plainly(figure: Any) -> None:
+    """Let new axes of a figure have plain numbers: matplotlib sets each as a formula, a third of the time that a picture takes."""
+    from matplotlib.ticker import ScalarFormatter
+
+    from .ticks import PlainNumbers
+
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            if type(axis.get_major_formatter()) is ScalarFormatter:
+                axis.set_major_formatter(PlainNumbers())
 
 
 def rendered(figure: Any, suffix: str, dpi: float) -> bytes:

@@ -63,6 +63,14 @@ def test_axes_are_labelled_with_units_and_senses():
     assert np.array_equal(offsets, flights().objectives)
 
 
+def test_numbers_are_text_and_only_powers_of_ten_are_formulas():
+    ax = black_box(9, 2, F=np.linspace([0.0, 3e8], [5.0, 1e8], 9)).plot()
+    draw(ax.figure)
+    numbers = [text.get_text() for axis in (ax.xaxis, ax.yaxis) for text in axis.get_ticklabels()]
+    assert {"0", "5", "1.00", "3.00"} <= set(numbers) and not any("$" in text for text in numbers)
+    assert ax.xaxis.get_offset_text().get_text() == "" and "10^{8}" in ax.yaxis.get_offset_text().get_text()
+
+
 def told(ax) -> dict[str, np.ndarray]:
     """What is drawn as a scatter plot, by its label."""
     return {drawn.get_label(): np.asarray(drawn.get_offsets()) for drawn in ax.collections}
