@@ -174,9 +174,12 @@ def ordering(
 
 
 def _sorted(rows: np.ndarray, keys: Sequence[tuple[np.ndarray, float]]) -> np.ndarray:
-    """Rows by the first key; those that are as good as the least of them, within its slack, by the next keys, and so on."""
+    """Rows, given in their order, by the first key; those that are as good as the least of them, within its slack, by the next keys, and so
+    on."""
     if not keys or len(rows) < 2:
         return rows
+    if not any(slack for _, slack in keys):
+        return rows[np.lexsort([key[rows] for key, _ in reversed(keys)])]
     key, slack = keys[0]
     rows = rows[np.argsort(key[rows])]
     values = key[rows]
