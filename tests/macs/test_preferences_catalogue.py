@@ -249,7 +249,7 @@ plain = st.recursive(
 )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_anything_else_is_refused_or_read(data: st.DataObject) -> None:
     kind = data.draw(st.sampled_from([*EVERY]))

@@ -58,7 +58,7 @@ def test_exact_and_equal_at_boundaries(classes):
             assert np.array([float(function(J)) for J in side.boundaries]) == pytest.approx(z, rel=1e-14)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(MANY)
 def test_monotone_and_positive(classes):
     for function, one in zip(functions(classes), classes, strict=True):
@@ -76,7 +76,7 @@ def test_monotone_and_positive(classes):
             assert values[-1] > values[len(values) // 2] > values[0]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(MANY)
 def test_once_continuously_differentiable(classes):
     for function in functions(classes):

@@ -187,12 +187,12 @@ def test_a_guided_search_beside_an_even_one():
 
 def test_intervals_by_density_beside_equal_ones():
     rows: list[Row] = []
-    density.bench_density(rows, (replace(density.QUICK[1], words=density.on(10, steps=14)),))
+    density.bench_density(rows, (replace(density.QUICK[1], words=density.on(10, steps=7)),))
     equal, dense = rows
     assert [row.who for row in rows] == [
         "equal",
         "density",
-    ] and equal.case == dense.case == "hypersensitive, multiple-shooting:10x14:linear"
+    ] and equal.case == dense.case == "hypersensitive, multiple-shooting:10x7:linear"
     assert dense.of("defect") < 1e-2 * equal.of("defect") and abs(dense.of("error")) < abs(equal.of("error"))
     assert equal.of("error") == pytest.approx(equal.of("objective") / 1.330806904943 - 1, rel=1e-9)
     assert equal.of("defect") == equal.of("defect of run.x") and density.worst(equal) == "run.x"

@@ -362,8 +362,8 @@ def test_a_front_is_the_start_of_a_search_with_other_data(capsys, monkeypatch):
     begun = []
     begin = macs.MACS.begin
     monkeypatch.setattr(macs.MACS, "begin", lambda self, *rest, **more: begun.append((rest, more)) or begin(self, *rest, **more))
-    call = ["solve", "glide.py:build", "--data", "speed=2", "--start", "front.nc", "--evaluations", "40", "--seed", "1", "--out", "other.nc"]
-    assert main(call) == 0
+    call = ["solve", "glide.py:build", "--data", "speed=2", "--start", "front.nc", "--evaluations", "40", "--seed", "1"]
+    assert main([*call, "--out", "other.nc"]) == 0
     ((rest, more),) = begun
     start = more.get("start", rest[-1])
     assert start.shape[0] >= len(Front.load("front.nc")), "its points are the first candidates"

@@ -155,8 +155,9 @@ def test_every_array_has_a_name_and_a_unit_and_is_that_of_to_xarray(tmp_path, na
     front.save(tmp_path / "front.nc")
     for phase in (None, *(("climb", "coast") if any(point.trajectory for point in front) else ())):
         data = xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf", group=phase)
-        assert data.equals(front.to_xarray(phase)) and set(data.variables) == set(front.to_xarray(phase).variables)
-        assert all(data[array].attrs["long_name"] and data[array].attrs["units"] for array in data.variables)
+        told = front.to_xarray(phase)
+        assert data.equals(told) and set(data.variables) == set(told.variables)
+        assert all(array.attrs["long_name"] and array.attrs["units"] for array in data.variables.values())
 
 
 def test_seeds_of_merged_fronts_are_numbers_too(tmp_path):

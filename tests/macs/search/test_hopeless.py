@@ -56,7 +56,8 @@ def unreachable() -> Problem:
 
 def test_the_conflict_is_known_after_few_solves_by_all_ways():
     """A metre is an eighth of the scale; the nearest end at rest, on any mesh with an edge or node in the middle, is at 0.25."""
-    fronts = [MACS().solve(unreachable(), seed=1), sweep(unreachable(), points=5), payoff(unreachable()), optimize(unreachable()).alone()]
+    problem = unreachable().compile()
+    fronts = [MACS().solve(problem, seed=1), sweep(problem, points=5), payoff(problem), optimize(problem).alone()]
     for front in fronts:
         point = front[0] if len(front) else front.closest
         assert point.status == "infeasible" and point.violations["final value of walk.x"] == pytest.approx(0.75 / 8, abs=1e-3)

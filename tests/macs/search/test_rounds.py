@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_opening import walk
 
-from macs import MACS, NSGA2
+from macs import MACS, NSGA2, Front
 from macs.evaluation import bilevel
 from macs.gradients import multistart
 from macs.pareto import directions
@@ -20,6 +21,7 @@ from macs.search import rounds as module
 from macs.search.rounds import AGAIN, BEYOND, DONE, LONG, PATIENCE, Rounds, beyond, gains, improves, judged
 from problems import load
 from problems.cases import goddard
+from problems.compiled import CompiledProblem
 from runs.measures.indicators import gd, hypervolume
 from transcription import DFET
 
@@ -137,6 +139,18 @@ MESH = DFET(3, 3)
 SMALL = MACS(agents=4, archive=6, mesh="fixed")
 
 
+@cache
+def walking() -> CompiledProblem:
+    """With which its NLPs are kept."""
+    return walk().compile()
+
+
+@cache
+def whole(seed: int) -> Front:
+    """Of a search that nothing stopped."""
+    return SMALL.solve(walking(), MESH, seed=seed, verify=None)
+
+
 def test_a_front_is_found_without_a_number():
     """The front of `goddard` is known; five times the budget finds no more of it."""
     front = MACS(mesh="fixed").solve(load("goddard"), seed=1, verify=None)
@@ -158,7 +172,7 @@ def test_objectives_in_no_conflict_end_soon():
 
 
 def test_a_ceiling():
-    front = replace(SMALL, ceiling=100).solve(walk(), MESH, seed=1, verify=None)
+    front = replace(SMALL, ceiling=100).solve(walking(), MESH, seed=1, verify=None)
     assert front.stats["stopped"] == "ceiling" and front.stats["evaluations"] == 100 and len(front) == 6
 
 
@@ -168,7 +182,7 @@ def test_nothing_feasible_ends_soon():
 
 
 def test_settings_follow_from_no_number_and_numbers_are_spent_in_full():
-    front = SMALL.solve(walk(), MESH, evaluations=600, seed=1, verify=None)
+    front = SMALL.solve(walking(), MESH, evaluations=600, seed=1, verify=None)
     assert front.stats["stopped"] == "budget" and front.stats["evaluations"] == 600 and "rounds" not in front.stats
 
 
@@ -180,13 +194,13 @@ def test_a_callback_ends_it():
         seen.append(progress.evaluations)
         return len(seen) == 3
 
-    front = SMALL.solve(walk(), MESH, seed=1, verify=None, callback=stop)
+    front = SMALL.solve(walking(), MESH, seed=1, verify=None, callback=stop)
     assert front.stats["stopped"] == "callback" and len(front) and front.stats["evaluations"] == seen[-1]
 
 
 @pytest.mark.parametrize("solve", [3, 8, 14])
 def test_it_goes_on_to_the_same_bits_from_the_middle_of_a_polish(tmp_path, monkeypatch, solve):
-    whole = SMALL.solve(walk(), MESH, seed=1, verify=None)
+    expected = whole(1)  # before anything is counted
     original, count = bilevel.scalarize, iter(range(10**6))
 
     def interrupting(*arguments, **more):
@@ -197,27 +211,27 @@ def test_it_goes_on_to_the_same_bits_from_the_middle_of_a_polish(tmp_path, monke
 
     with monkeypatch.context() as patch:
         patch.setattr(bilevel, "scalarize", interrupting)
-        part = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+        part = SMALL.solve(walking(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
     assert part.stats["stopped"] == "interrupted"
     rest = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
-    assert np.array_equal(rest.F, whole.F) and np.array_equal(rest.decision, whole.decision)
-    assert rest.stats["rounds"] == whole.stats["rounds"] and rest.stats["stopped"] == whole.stats["stopped"] == "done"
+    assert np.array_equal(rest.F, expected.F) and np.array_equal(rest.decision, expected.decision)
+    assert rest.stats["rounds"] == expected.stats["rounds"] and rest.stats["stopped"] == expected.stats["stopped"] == "done"
 
 
 @pytest.mark.parametrize("iterations", [1, 10, 20])
 def test_it_goes_on_to_the_same_bits_from_between_iterations(tmp_path, iterations):
-    whole, left = SMALL.solve(walk(), MESH, seed=2, verify=None), iter(range(iterations))
-    part = SMALL.solve(walk(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt", callback=lambda p: next(left, None) is None)
+    expected, left = whole(2), iter(range(iterations))
+    part = SMALL.solve(walking(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt", callback=lambda p: next(left, None) is None)
     assert part.stats["stopped"] == "callback"
     rest = SMALL.solve(walk(), MESH, seed=2, verify=None, checkpoint=tmp_path / "run.ckpt")
-    assert np.array_equal(rest.F, whole.F) and rest.stats["evaluations"] == whole.stats["evaluations"]
+    assert np.array_equal(rest.F, expected.F) and rest.stats["evaluations"] == expected.stats["evaluations"]
 
 
 def test_a_fruitless_round_is_not_polished(monkeypatch):
     """The second round of `walk` finds nothing beyond its front: the archive stays as the first polish left it."""
     polishes, original = [], module.Rounds.news
     monkeypatch.setattr(module.Rounds, "news", lambda self, found: polishes.append(original(self, found)) or polishes[-1])
-    front = SMALL.solve(walk(), MESH, seed=1, verify=None)
+    front = SMALL.solve(walking(), MESH, seed=1, verify=None)
     assert polishes and polishes[-1] is False and front.stats["rounds"] == len(polishes) + 1
 
 
@@ -232,7 +246,7 @@ def test_others_need_a_number():
 @pytest.mark.parametrize("solve", [2, 9, 25])
 def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_path, monkeypatch, solve):
     """Solve 2 and 9 are of the opening, which begins anew then, since there is no state yet; 25 of a later round."""
-    whole = SMALL.solve(walk(), MESH, seed=1, verify=None)
+    expected = whole(1)  # before anything is counted
     original, count = multistart.scalarize, iter(range(10**6))
 
     def interrupting(*arguments, **more):
@@ -242,7 +256,7 @@ def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_p
 
     with monkeypatch.context() as patch:
         patch.setattr(multistart, "scalarize", interrupting)
-        part = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
+        part = SMALL.solve(walking(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
     assert part.stats["stopped"] == "interrupted" and not part.stats["reproducible"]
     rest = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
-    assert np.array_equal(rest.F, whole.F) and rest.stats["gradient_solves"] == whole.stats["gradient_solves"]
+    assert np.array_equal(rest.F, expected.F) and rest.stats["gradient_solves"] == expected.stats["gradient_solves"]

@@ -127,12 +127,13 @@ BASELINES = [
 @pytest.mark.parametrize("constraints", [None, lambda X: 0.5 - X[:, :1]], ids=["free", "constrained"])
 def test_baselines_go_on_to_the_same_bits(file, solver, constraints) -> None:
     given = {"evaluations": 150, "constraints": constraints}
+    whole = minimize(solver, **given)
     for iterations in (0, 2):
         counted = Counted()
         stopped = minimize(solver, f=counted, checkpoint=file, callback=after(iterations), **given)
         assert stopped.stats["stopped"] == "callback"
         resumed = Counted()
-        assert_same(minimize(solver, f=resumed, checkpoint=file, **given), minimize(solver, **given))
+        assert_same(minimize(solver, f=resumed, checkpoint=file, **given), whole)
         assert counted.rows + resumed.rows == 150
         file.unlink()
 
