@@ -51,7 +51,8 @@ def legend(figure: Any, ax: Any, place: str | None, title: str = "") -> None:
 
 def _covers(figure: Any, ax: Any, within: Any) -> bool:
     """Whether lines, markers or areas of the axes are behind their legend."""
-    figure.draw_without_rendering()
+    # That lays it out, and does not draw it.
+    figure.get_layout_engine().execute(figure)
     box = within.get_window_extent()
     for line in ax.get_lines():
         path = line.get_path().transformed(line.get_transform())

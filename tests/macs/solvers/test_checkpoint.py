@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from compiled_cases import compiled
 
 from macs import CTAEA, MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA, Front
 from macs.evaluation import bilevel
@@ -29,8 +30,6 @@ from macs.io import interrupts as monitor
 from macs.solvers import checkpoint, checkpoint_file
 from macs.solvers.checkpoint_file import to_bytes
 from macs.solvers.solver import Solver
-from problems import load
-from problems.compiled import CompiledProblem
 from transcription import DFET
 from transcription.inner import Ipopt
 from transcription.nlp.scalarized import Solved
@@ -48,12 +47,6 @@ def function(X: np.ndarray) -> np.ndarray:
 
 def minimize(solver: Solver = SMALL, box: Any = BOX, f: Any = function, evaluations: int = 400, seed: int | None = 1, **more: Any) -> Front:
     return solver.minimize(f, box, evaluations=evaluations, seed=seed, **more)
-
-
-@cache
-def compiled(problem: str) -> CompiledProblem:
-    """A case, with which its NLPs are kept."""
-    return load(problem).compile()
 
 
 def solve(solver: Solver = POLISHED, evaluations: int = 160, seed: int | None = 1, problem: str = "orbit_rise", **more: Any) -> Front:

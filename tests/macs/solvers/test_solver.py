@@ -9,6 +9,7 @@ import warnings
 import casadi as ca
 import numpy as np
 import pytest
+from compiled_cases import compiled
 
 from macs import MACS, NSGA2, Progress, sweep
 from macs.evaluation.evaluator import Counts
@@ -75,7 +76,7 @@ def test_a_callback_sees_progress_and_stops_the_search() -> None:
         assert len(progress.front) == progress.archive
         return np.bool_(progress.evaluations > 200)  # type: ignore[return-value] - what comparing arrays gives
 
-    front = MACS().solve(load("orbit_rise"), MESH, evaluations=5000, seed=1, callback=callback)
+    front = MACS().solve(compiled("orbit_rise"), MESH, evaluations=5000, seed=1, callback=callback)
     assert front.stats["stopped"] == "callback"
     assert not front.stats["reproducible"]
     assert seen[-1].evaluations == front.stats["evaluations"] < 5000
@@ -83,7 +84,7 @@ def test_a_callback_sees_progress_and_stops_the_search() -> None:
 
 
 def test_a_time_limit_keeps_what_was_found() -> None:
-    front = MACS().solve(load("orbit_rise"), MESH, evaluations=10**6, seed=1, time_limit=0.5)
+    front = MACS().solve(compiled("orbit_rise"), MESH, evaluations=10**6, seed=1, time_limit=0.5)
     assert front.stats["stopped"] == "time limit"
     assert not front.stats["reproducible"]
     assert len(front) > 0
@@ -96,7 +97,7 @@ def test_an_interrupt_keeps_what_was_found() -> None:
         if progress.evaluations > 100:
             os.kill(os.getpid(), signal.SIGINT)
 
-    front = MACS().solve(load("orbit_rise"), MESH, evaluations=5000, seed=1, callback=press)
+    front = MACS().solve(compiled("orbit_rise"), MESH, evaluations=5000, seed=1, callback=press)
     assert front.stats["stopped"] == "interrupted"
     assert len(front) > 0
     assert signal.getsignal(signal.SIGINT) is before
@@ -122,24 +123,24 @@ def test_an_interrupt_within_the_first_population_keeps_what_it_had(monkeypatch)
         return tuple(np.concatenate(pair) for pair in zip(first, rest, strict=True))
 
     monkeypatch.setattr(Ipopt, "_solve_all", interrupted)
-    front = MACS().solve(load("goddard"), MESH, evaluations=10, seed=1, inner="ipopt")
+    front = MACS().solve(compiled("goddard"), MESH, evaluations=10, seed=1, inner="ipopt")
     assert 0 < len(front) <= 3 and front.stats["failures"] == {"timeout": 7}
     assert front.stats["stopped"] == "interrupted" and not front.stats["reproducible"]
 
 
 def test_one_evaluation_is_one() -> None:
-    front = MACS(mesh="fixed").solve(load("goddard"), MESH, evaluations=1, seed=1)
+    front = MACS(mesh="fixed").solve(compiled("goddard"), MESH, evaluations=1, seed=1)
     assert "MACS, 1 evaluation, " in front.table() and "Made feasible" not in front.table()
 
 
 def test_a_start_is_used_and_never_made_worse() -> None:
-    first = MACS(mesh="fixed").solve(load("orbit_rise"), MESH, evaluations=300, seed=1)
-    again = MACS(mesh="fixed").solve(load("orbit_rise"), MESH, evaluations=60, seed=2, start=first)
+    first = MACS(mesh="fixed").solve(compiled("orbit_rise"), MESH, evaluations=300, seed=1)
+    again = MACS(mesh="fixed").solve(compiled("orbit_rise"), MESH, evaluations=60, seed=2, start=first)
     for row in first.F:
         assert not (row < again.F).all(axis=1).all()
     best = first.F.min(axis=0)
     assert (again.F.min(axis=0) <= best + 1e-6 * np.ptp(first.F, axis=0)).all()  # equal to the digits that a solve has
-    assert len(MACS(mesh="fixed").solve(load("orbit_rise"), MESH, evaluations=30, seed=2, start=first[0])) > 0
+    assert len(MACS(mesh="fixed").solve(compiled("orbit_rise"), MESH, evaluations=30, seed=2, start=first[0])) > 0
 
 
 def test_a_guess_is_among_the_first() -> None:
@@ -152,15 +153,15 @@ def test_a_guess_is_among_the_first() -> None:
 
 
 def test_a_start_of_another_problem_is_refused() -> None:
-    other = MACS().solve(load("goddard"), DFET(4, 1), evaluations=30, seed=1)
+    other = MACS().solve(compiled("goddard"), DFET(4, 1), evaluations=30, seed=1)
     with pytest.raises(ValueError, match="other variables"):
-        MACS().solve(load("orbit_rise"), MESH, evaluations=30, start=other)
+        MACS().solve(compiled("orbit_rise"), MESH, evaluations=30, start=other)
     with pytest.raises(ValueError, match="other variables"):
-        MACS().solve(load("orbit_rise"), MESH, evaluations=30, start=[other.closest or other[0]])
+        MACS().solve(compiled("orbit_rise"), MESH, evaluations=30, start=[other.closest or other[0]])
 
 
 def test_a_start_of_another_problem_is_refused_before_a_mesh_is_found(monkeypatch) -> None:
-    other = MACS().solve(load("goddard"), DFET(4, 1), evaluations=30, seed=1)
+    other = MACS().solve(compiled("goddard"), DFET(4, 1), evaluations=30, seed=1)
     monkeypatch.setattr("macs.solvers.solver.search_transcription", lambda *_: pytest.fail("work before the check"))
     with pytest.raises(ValueError, match="other variables"):
         MACS().solve(load("orbit_rise"), evaluations=30, start=other)
@@ -189,16 +190,16 @@ def test_a_front_of_other_data_may_begin_a_search(mesh) -> None:
 
 
 def test_a_start_of_another_mesh_is_interpolated() -> None:
-    coarse = MACS(mesh="fixed").solve(load("orbit_rise"), DFET(6, 2), evaluations=300, seed=1, inner="projection")
-    fine = MACS(mesh="fixed").solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, start=coarse, inner="projection")
-    bare = MACS(mesh="fixed").solve(load("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, inner="projection")
+    coarse = MACS(mesh="fixed").solve(compiled("orbit_rise"), DFET(6, 2), evaluations=300, seed=1, inner="projection")
+    fine = MACS(mesh="fixed").solve(compiled("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, start=coarse, inner="projection")
+    bare = MACS(mesh="fixed").solve(compiled("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, inner="projection")
     span = np.ptp(coarse.F, axis=0)
     assert ((fine.F.min(axis=0) - coarse.F.min(axis=0)) / span < 0.05).all()
     assert (fine.F[:, 1].min() - coarse.F[:, 1].min()) < (bare.F[:, 1].min() - coarse.F[:, 1].min())
 
 
 def test_a_clock_makes_a_run_not_reproducible() -> None:
-    front = MACS().solve(load("goddard"), MESH, evaluations=12, seed=1, inner=Ipopt(seconds=1e-6))
+    front = MACS().solve(compiled("goddard"), MESH, evaluations=12, seed=1, inner=Ipopt(seconds=1e-6))
     assert not front.stats["reproducible"]
 
 
