@@ -9,6 +9,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
+from compiled_cases import compiled
 from smooth_problems import compass, corners, shuttle, slide, still, two_wells, with_peak
 
 from macs import Front, optimize, payoff, sweep
@@ -37,7 +38,7 @@ def certificates(front: Front) -> np.ndarray:
 
 @cache
 def goddard(method: str = "pascoletti-serafini") -> Front:
-    return sweep(load("goddard"), DFET(4, 6), points=10, method=method, starts=1)
+    return sweep(compiled("goddard"), DFET(4, 6), points=10, method=method, starts=1)
 
 
 # Against the truth
@@ -74,7 +75,7 @@ def test_both_methods_lie_on_one_curve() -> None:
 
 
 def test_a_point_found_by_limits_is_found_by_descent() -> None:
-    problem, mesh = load("orbit_rise"), DFET(8, 2)
+    problem, mesh = compiled("orbit_rise"), DFET(8, 2)
     limited = sweep(problem, mesh, points=5, method="epsilon", starts=1)
     fine = sweep(problem, mesh, points=101, start=limited, starts=1)
     assert distances(limited, fine.objectives).max() < 1e-4

@@ -28,7 +28,7 @@ def test_least_effort_is_that_of_an_optimal_flight():
 
 
 def test_the_front_of_one_is_that_of_a_scan_of_the_ground():
-    axis = np.linspace(-1.0, landing_site.REACH, 2001)
+    axis = np.linspace(-1.0, landing_site.REACH, 1401)
     x, y = np.meshgrid(axis, axis)
     sites = np.stack([landing_site.least_effort(x, y).ravel(), landing_site.hazard(x, y).ravel()], axis=1)
     scan = sites[nondominated(sites)]

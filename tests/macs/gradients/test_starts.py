@@ -115,7 +115,7 @@ def test_what_only_one_start_found_is_said():
 def test_a_front_to_start_from_is_never_made_worse():
     """A first solve from a good point may leave its well; the point itself then counts."""
     depths = [1.0, 1.1, 3.0, 1.2, 1.0, 1.3, 1.1, 1.0]
-    problem = wells(depths)
+    problem = wells(depths).compile()
     best = payoff(problem, DFET(1, 1))
     again = payoff(problem, DFET(1, 1), start=best, starts=1)
     assert again.F[0, 0] <= best.F[0, 0] + 1e-9 and again.F[1, 1] <= best.F[1, 1] + 1e-9

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import Evaluation
 from macs.search.effort import CHEAP, DEAR, LEAST, Gains, credited, evaluated, no_effort, spent, ways_of
 from problems import Problem, load
+from problems.compiled import CompiledProblem
 from transcription import DFET, parse
 from transcription.inner import Auto, inner_solver
 
@@ -100,6 +103,12 @@ def swing() -> Problem:
     return problem
 
 
+@cache
+def swinging() -> CompiledProblem:
+    """With which its NLPs are kept."""
+    return swing().compile()
+
+
 MESH = DFET(6, 4)
 
 
@@ -135,14 +144,14 @@ def test_a_divided_search_takes_a_part_of_the_work_and_finds_as_good_a_front():
 
 
 def test_a_divided_search_goes_on_to_the_same_bits(tmp_path):
-    def go(**more):
-        return MACS(agents=4, archive=4, mesh="fixed").solve(swing(), MESH, evaluations=120, seed=2, inner="auto", verify=None, **more)
+    def go(problem, **more):
+        return MACS(agents=4, archive=4, mesh="fixed").solve(problem, MESH, evaluations=120, seed=2, inner="auto", verify=None, **more)
 
     left = iter(range(2))
-    whole = go()
-    part = go(checkpoint=tmp_path / "run.ckpt", callback=lambda progress: next(left, None) is None)
+    whole = go(swinging())
+    part = go(swinging(), checkpoint=tmp_path / "run.ckpt", callback=lambda progress: next(left, None) is None)
     assert part.stats["evaluations"] < 120
-    again = go(checkpoint=tmp_path / "run.ckpt")
+    again = go(swing(), checkpoint=tmp_path / "run.ckpt")
     assert np.array_equal(again.F, whole.F) and again.stats["ways"] == whole.stats["ways"]
 
 
@@ -160,6 +169,6 @@ def test_without_gradients_candidates_are_made_feasible_as_by_the_fixed_rule():
     """Nothing else would: what is only propagated costs little, and is hardly ever feasible."""
 
     def found(inner):
-        return MACS(agents=4, archive=5, refine=False).solve(swing(), MESH, evaluations=60, seed=1, inner=inner, verify=None)
+        return MACS(agents=4, archive=5, refine=False).solve(swinging(), MESH, evaluations=60, seed=1, inner=inner, verify=None)
 
     assert np.array_equal(found("auto").F, found("projection").F)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from boxes import boxed
+from compiled_cases import compiled
 from fronts import distance_to_curve
 
 from macs import MACS, Front
@@ -30,6 +31,7 @@ from macs.search.region import PART, Region
 from problems import load
 from problems.cases import goddard
 from problems.compiled import Objective
+from transcription import DFET
 
 GOALS = (Objective("f1"), Objective("f2"))
 MIDDLE = ReferencePoint({"f1": 0.0, "f2": 0.0}, augmentation=0.0)
@@ -278,7 +280,7 @@ FLIGHT = ReferencePoint({"flight time": 150.0, "horizontal speed": 0.6})
 def flights() -> dict[str, Front]:
     """Fronts by gradients, one guided, one even."""
     return {
-        who: MACS(prefer=prefer, mesh="fixed").solve(load("goddard"), evaluations=800, seed=1, verify=None)
+        who: MACS(prefer=prefer, mesh="fixed").solve(compiled("goddard"), DFET(4, 6), evaluations=800, seed=1, verify=None)
         for who, prefer in (("guided", FLIGHT), ("even", None))
     }
 

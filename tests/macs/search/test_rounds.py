@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from compiled_cases import compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_opening import walk
@@ -153,10 +154,10 @@ def whole(seed: int) -> Front:
 
 def test_a_front_is_found_without_a_number():
     """The front of `goddard` is known; five times the budget finds no more of it."""
-    front = MACS(mesh="fixed").solve(load("goddard"), seed=1, verify=None)
+    front = MACS(mesh="fixed").solve(compiled("goddard"), DFET(4, 6), seed=1, verify=None)
     assert front.stats["stopped"] == "done" and front.stats["evaluations"] <= 1500 and front.stats["rounds"] >= 2
     assert gd(front, goddard.reference()) < 1e-3 and len(front) == 10
-    long = MACS(mesh="fixed").solve(load("goddard"), evaluations=5 * front.stats["evaluations"], seed=1, verify=None)
+    long = MACS(mesh="fixed").solve(compiled("goddard"), DFET(4, 6), evaluations=5 * front.stats["evaluations"], seed=1, verify=None)
     assert hypervolume(front, goddard.reference()) > 0.999 * hypervolume(long, goddard.reference())
 
 
