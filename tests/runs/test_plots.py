@@ -15,6 +15,7 @@ from runs.measures.attainment import attainment
 from runs.measures.references import foreign
 from runs.report.flight_plots import flights_figure, paths_figure, representatives
 from runs.report.plots import attainment_figure, convergence_figure, front_figure
+from runs.report.style import legend, new_figure
 
 GOALS = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
 A = np.array([[1.0, 1.0], [3.0, 3.0]])
@@ -149,6 +150,32 @@ def test_no_legend_on_a_line(values, inside):
     figure = convergence_figure({"ours": [run]}, xlabel="evaluations", ylabel="hypervolume", larger=True, log=False)
     (ax,) = figure.axes
     assert (ax.get_legend() is not None) == inside and len(figure.legends) == (not inside)
+
+
+def test_a_legend_is_where_the_layout_puts_it():
+    """A label of many lines makes room for the axes scarce: their legend then covers more of them, and a line beside it."""
+
+    def drawn(place: float, laid_out: bool = False):
+        figure = new_figure(3.5, 2.5)
+        ax = figure.subplots()
+        ax.set(xlim=(0, 1), ylim=(0, 1), ylabel="\n" * 5)
+        ax.axvline(place, label="a line")
+        if laid_out:
+            figure.get_layout_engine().execute(figure)
+        return figure, ax
+
+    def left(laid_out: bool) -> float:
+        """Of the legend, in parts of the axes."""
+        _, ax = drawn(0.0, laid_out)
+        box = ax.legend(loc="upper right", frameon=False, handlelength=1.6).get_window_extent()
+        return float(ax.transAxes.inverted().transform(box)[0, 0])
+
+    loose, tight = left(False), left(True)
+    assert tight < loose - 0.05, "else this test says nothing"
+    for place, inside in ((0.5 * (loose + tight), False), (tight - 0.1, True)):
+        figure, ax = drawn(place)
+        legend(figure, ax, "upper right")
+        assert (ax.get_legend() is not None) == inside and len(figure.legends) == (not inside)
 
 
 def test_flights_side_by_side_and_the_law(tmp_path):
