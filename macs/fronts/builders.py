@@ -46,7 +46,7 @@ def trajectory_points(
     if len(archive):
         found = certified(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certify else {}
         return vectors_points(nlp, archive.Z, solver, stats, **found)
-    nearest = vectors_points(nlp, closest.Z, solver, stats)[0]
+    nearest = vectors_points(nlp, closest.Z[:1], solver, stats)[0]
     violated = conflict(nlp, nearest) if certify and _settled(stats) else nearest_violation(nearest)
     return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {violated}", closest=nearest)
 

@@ -186,6 +186,15 @@ def test_the_least_violated_point_is_the_first_of_those_that_violate_least():
     assert least_violated(closest, *offered, np.array([0.4, 0.3, 0.5])).Z.tolist() == [[1.0]]
 
 
+def test_the_least_violated_points_differ_and_only_the_first_may_have_failed():
+    closest = Archive(np.array([[1.0]]), np.array([[5.0, 5.0]]), np.array([0.3]))
+    Z, F = np.array([[2.0], [1.0], [4.0]]), np.array([[0.0, 0.0], [5.0, 5.0], [2.0, 2.0]])
+    assert least_violated(closest, Z, F, np.array([0.4, 0.3, 0.2]), 5).Z.tolist() == [[4.0], [1.0], [2.0]]
+    assert least_violated(closest, Z, F, np.array([0.4, 0.3, 0.2]), 2).Z.tolist() == [[4.0], [1.0]]
+    assert least_violated(closest, Z, F, np.array([np.inf, 0.3, np.inf]), 5).Z.tolist() == [[1.0]]
+    assert least_violated(closest.take([]), Z, F, np.full(3, np.inf), 5).Z.tolist() == [[2.0]]
+
+
 def test_what_an_archive_keeps_has_less_energy_by_the_exponent_that_is_given():
     """Than what it keeps for another exponent."""
     points = np.abs(np.random.default_rng(0).standard_normal((60, 3)))
