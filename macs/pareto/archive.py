@@ -115,8 +115,8 @@ def outside(
     """
     offered = np.flatnonzero((violation > tolerance) & np.isfinite(violation) & np.isfinite(F).all(axis=1))
     both = known.joined(Archive(Z[offered], F[offered], violation[offered]))
-    free = ~np.asarray(dominates(archive.F[:, None], both.F)).any(axis=0)
-    return _thinned(both.take(free), int(free[: len(known)].sum()), limit)
+    free = np.flatnonzero(~np.any(dominates(archive.F[:, None], both.F), axis=0))
+    return _thinned(both.take(free), int((free < len(known)).sum()), limit)
 
 
 def _thinned(points: Archive, known: int, limit: int, exponent: float | None = None, guide: Guide | None = None) -> Archive:

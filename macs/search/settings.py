@@ -17,8 +17,8 @@ from ..pareto.niches import MANY
 from ..preferences.catalogue import from_dict
 from ..preferences.preference import Preference
 
-SOME, GENERATION = 0.15, 1.0
-"""Defaults of `breeding`: few offspring, which leave most of the budget to the agents, or one of each point."""
+SOME, GENERATION, GENERATIONS = 0.15, 1.0, 2.0
+"""Defaults of `breeding`: few offspring, which leave most of the budget to the agents; one of each point; two of each."""
 FEW_POINTS = 10
 """Points of an archive up to which, by default, all agents have a direction."""
 LONG, ALONE = 30_000, 6000
@@ -149,7 +149,9 @@ class Settings:
     breeding : float, optional
         Number of offspring of each point of the archive in an iteration, in [0, 10]; if positive, at least as many offspring as agents.
         More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15 with up to two
-        objectives, and with three where there are `lone` agents; otherwise, and as long as nothing is feasible, 1. 0 in the paper.
+        objectives, and with three where there are `lone` agents; otherwise 1; and 2 as long as nothing is feasible. If positive,
+        infeasible points with better objectives than the archive's have one child each, where the inner level does not move candidates.
+        0 in the paper.
     sample : int, optional
         Number of points of the first population, at least that of the agents. Default: the size of the archive, but at most a twentieth of
         the budget and at least the number of agents. In the paper: the number of agents.
@@ -311,8 +313,8 @@ class Settings:
     def offspring(self, parents: int, m: int, lone: int = 0, feasible: bool = True) -> int:
         """Number of offspring of so many parents in an iteration, with m objectives, in which so many lone agents act; 0 without
         parents."""
-        some = feasible and (m <= CURVE or (m <= MANY and lone > 0))
-        each = (SOME if some else GENERATION) if self.breeding is None else self.breeding
+        each = SOME if m <= CURVE or (m <= MANY and lone > 0) else GENERATION
+        each = (each if feasible else GENERATIONS) if self.breeding is None else self.breeding
         return max(self.agents + lone, round(each * parents)) if each and parents else 0
 
     def social_agents(self, m: int) -> int:
