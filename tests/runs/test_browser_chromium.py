@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from chromium import NEEDS_CHROMIUM, errors, started, wait
 from synthetic_fronts import black_box, flights, marked
 
 from runs.browser import page as pages
+from runs.browser.curves import differences
 from runs.browser.front_page import front_page
 from runs.browser.points import about, columns, details, goals_data, samples_of
 
@@ -47,6 +49,11 @@ def test_a_click_selects_a_point_and_shows_its_trajectory(browser, tmp_path):
     wait(browser, "document.querySelector('.panel-plot').data")
     last = browser.execute_script("return document.querySelector('.panel-plot').data[0].y.at(-1)")
     assert last == pytest.approx(front[index].trajectory["climb"].edge_states[-1, 0], rel=1e-5)
+    times, heights = browser.execute_script("const { x, y } = document.querySelector('.panel-plot').data[0]; return [x, y]")
+    assert heights == pytest.approx(front[index].trajectory["climb"].at(np.array(times))["h"], rel=1e-5)
+    values = np.array([-3.5e14, 0.0, np.nan, 2.25e14])
+    told = browser.execute_script("return curveValues(arguments[0])", differences(values))
+    assert np.array(told, dtype=float) == pytest.approx(values, nan_ok=True)
     assert browser.execute_script("return document.querySelectorAll('#table tr[aria-selected=true]').length") == 1
     assert errors(browser) == []
 

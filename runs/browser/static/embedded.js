@@ -13,6 +13,17 @@ async function readDetails(run) {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).json();
 }
 
+/**
+ * Have the drawing package read and compiled as a script of its own, beside this page; then draw. Handed over at once, it is read before the
+ * page counts as loaded, so that programs that print pages wait for it.
+ */
+function readPackage() {
+  const address = URL.createObjectURL(new Blob([byId("package").textContent], { type: "text/javascript" }));
+  const failed = () => fill(byId("plot-note"), element("span", { class: "warning" }, "The drawing package cannot be read: there are no figures."));
+  document.head.append(element("script", { src: address, onload: drawFigures, onerror: failed }));
+  if (state.points.length > MANY) hasGl(); // the graphics card is made ready in the meantime
+}
+
 begin();
 state.data = JSON.parse(byId("page").textContent);
 showComparison(state.data.comparisons[0]);

@@ -33,7 +33,7 @@ const layout = (more = {}) => ({
   separators: ".", // of decimals; none of thousands
   paper_bgcolor: "#fff",
   plot_bgcolor: "#fff",
-  margin: { l: 60, r: 34, t: 30, b: 50 },
+  margin: { l: 60, r: 34, t: 30, b: 52 },
   modebar: { orientation: "v" }, // beside the figure, not above its legend
   hovermode: "closest",
   hoverlabel: { bgcolor: "#fff", bordercolor: INK, font: FONT, align: "left" },
