@@ -158,9 +158,9 @@ def thinned(values: np.ndarray, most: int) -> np.ndarray:
 def differences(values: np.ndarray) -> list[int | None]:
     """Values with `DIGITS` digits of their range, as whole numbers that take little room.
 
-    The first of them is the number of decimals, which may be negative. Then follow the differences of order `ORDER` of the values times that
-    power of ten, as if values of zero came before the first: so many sums of them, each over all that came before, are the values again. None
-    stands for a value that is not finite; differences pass over it.
+    The first of them is the number of decimals, which may be negative. Then follow the differences of order `ORDER` of the values times
+    that power of ten, as if zeros came before the first: cumulative sums, taken so many times, are the values again. None stands for a
+    value that is not finite; differences pass over it.
     """
     finite = np.isfinite(values)
     known = values[finite]

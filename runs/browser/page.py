@@ -29,8 +29,8 @@ EMBEDDED, LIVE = "embedded.js", ("progress.js", "live.js")
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'none'"
 )
-"""Content Security Policy: nothing from another place. 'unsafe-eval': the drawing package compiles programs for the graphics card; blob: the
-page hands that package to the browser under an address that only the page has."""
+"""Content Security Policy: nothing from another place. 'unsafe-eval': the drawing package compiles programs for the graphics card. "blob:":
+the page hands that package to the browser under an address that only the page has."""
 LIVE_POLICY = "default-src 'none'; script-src 'self' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'"
 """That of a page with a server: nothing but from that."""
 
@@ -107,8 +107,8 @@ WRAPPER = re.compile(r"(/\*.*?\*/\n)\(\s*function\(root, factory\).*? self : thi
 def plotly() -> bytes:
     """The script of plotly, from its Python package. Raises ValueError if that is not installed.
 
-    It comes without the function for loaders of modules, which is around all of it: browsers would read it all twice, first to find where that
-    function ends, then because it is called.
+    It comes without the function for loaders of modules, which is around all of it: browsers would read it all twice, first to find where
+    that function ends, then because it is called.
     """
     try:
         from plotly.offline import get_plotlyjs
