@@ -21,7 +21,8 @@ function readPackage() {
   const address = URL.createObjectURL(new Blob([byId("package").textContent], { type: "text/javascript" }));
   const failed = () => fill(byId("plot-note"), element("span", { class: "warning" }, "The drawing package cannot be read: there are no figures."));
   document.head.append(element("script", { src: address, onload: drawFigures, onerror: failed }));
-  if (state.points.length > MANY) hasGl(); // the graphics card is made ready in the meantime
+  // The graphics card is made ready in the meantime, once the table has been seen.
+  if (state.points.length > MANY) requestAnimationFrame(() => setTimeout(hasGl));
 }
 
 begin();
