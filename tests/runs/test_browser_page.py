@@ -152,6 +152,20 @@ def test_a_page_loads_nothing_and_stays_small():
     assert front_page(flights(10)) == content  # the same bytes for the same front
 
 
+def test_the_drawing_package_comes_without_what_is_for_loaders_of_modules(monkeypatch):
+    from plotly.offline import get_plotlyjs
+
+    whole, told = get_plotlyjs(), pages.plotly().decode()
+    assert whole.index("self : this") < 1000 and "self : this" not in told[:1000]
+    assert "Licensed under the MIT license" in told[:200] and told.rstrip().endswith("window.Plotly = Plotly;")
+    assert 0 < len(whole) - len(told) < 500
+    # One that is wrapped otherwise is taken as it is.
+    pages.plotly.cache_clear()
+    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "window.Plotly = {};")
+    assert pages.plotly() == b"window.Plotly = {};"
+    pages.plotly.cache_clear()
+
+
 EVIL = "</script><script>alert(1)</script><!-- {{style}} %{x} $a$ & <b>"
 
 
