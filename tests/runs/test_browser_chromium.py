@@ -182,6 +182,19 @@ def test_a_page_has_its_figures_once_it_is_loaded(browser, tmp_path):
     finally:
         browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", {"identifier": added["identifier"]})
     assert browser.execute_script("return window.drawnOnceLoaded") == "yes"
+    assert browser.execute_script("return document.querySelector('script[src]')") is None
+
+
+@pytest.mark.slow
+def test_without_the_drawing_package_there_are_the_table_and_a_word(browser, tmp_path):
+    path = tmp_path / "page.html"
+    path.write_bytes(front_page(flights(3)).replace(b"'unsafe-eval' blob:;", b"'unsafe-eval';"))
+    browser.get(path.as_uri())
+    wait(browser, "byId('plot-note').textContent.includes('cannot be read')")
+    browser.execute_script("select(state.points[1].key)")
+    wait(browser, "byId('flights-note').textContent.includes('Point 1')")
+    assert browser.execute_script("return document.querySelectorAll('#table tbody tr').length") == 3
+    assert ["Content Security Policy" in one for one in errors(browser)] == [True]
 
 
 @pytest.mark.slow

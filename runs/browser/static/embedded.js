@@ -20,7 +20,10 @@ async function readDetails(run) {
 function readPackage() {
   const address = URL.createObjectURL(new Blob([byId("package").textContent], { type: "text/javascript" }));
   const failed = () => fill(byId("plot-note"), element("span", { class: "warning" }, "The drawing package cannot be read: there are no figures."));
-  document.head.append(element("script", { src: address, onload: drawFigures, onerror: failed }));
+  const script = element("script", { src: address, onload: drawFigures, onerror: failed });
+  // A copy of the page that the browser saves must not have this address.
+  for (const end of ["load", "error"]) script.addEventListener(end, () => { script.remove(); URL.revokeObjectURL(address); });
+  document.head.append(script);
   // The graphics card is made ready in the meantime, once the table has been seen.
   if (state.points.length > MANY) requestAnimationFrame(() => setTimeout(hasGl));
 }
