@@ -166,7 +166,7 @@ def test_a_hundred_runs_of_a_hundred_points_open_with_the_work_of_the_drawing_pa
     seconds, work = ({name: np.median([one[k] for one in all_]) for name, all_ in found.items()} for k in (0, 1))
     for name in contents:
         print(f"{name}: {seconds[name]:.2f} s until the figure is there, {work[name]:.2f} s of work on the main thread")
-    # Two seconds are asked for: on two idle cores it took 1.2 s with this work. How many they are on a busy machine says nothing of the page.
+    # Two seconds are asked for: on two idle cores it took 1.2 s with this work. On a busy machine seconds say nothing of the page.
     assert work["10 000 points"] < 1.25 * work["package alone"]
     assert work["10 points"] < 0.85 * work["package alone"]
 
