@@ -18,6 +18,7 @@ from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped, check_stopping
 from transcription.trajectories.costates import Costates
 from transcription.trajectories.limits import excursions
+from transcription.trajectories.simulate import limits_by_label
 
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..io.text import counted
@@ -109,7 +110,14 @@ def nearest_violation(nearest: Point) -> str:
     if not np.isfinite(amount):
         return f"all failed: {label} is not a number"
     also = "".join(f", and {name} by {size:.2g}" for name, size in others if size > SIDE * amount)
-    return f"the nearest violates {label} by {amount:.2g} of its scale{also}"
+    return f"the nearest violates {label} by {amount:.2g} of its scale{_scale_in_unit(nearest, label)}{also}"
+
+
+def _scale_in_unit(point: Point, label: str) -> str:
+    """What counts as one in a constraint of a point, after a comma, if it has a unit."""
+    problem = point._points.problem
+    limit = limits_by_label(problem).get(label) if isinstance(problem, CompiledProblem) else None
+    return f", {limit.scale:g} {limit.unit}" if limit is not None and limit.unit else ""
 
 
 def conflict(nlp: NLP, nearest: Point) -> str:

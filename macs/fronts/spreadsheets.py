@@ -63,7 +63,7 @@ def save_point_csv(point: Any, path: str | PathLike[str]) -> None:
         every = [("", "time", phase.time_unit, phase.time)]
         every += [("state", v.name, v.unit, phase[v.name]) for v in phase.state_variables]
         every += [("control", v.name, v.unit, phase[v.name]) for v in phase.control_variables]
-        every += [("path", limit.name, "", phase[limit.name]) for limit in phase.path_limits]
+        every += [("path", limit.name, limit.unit, phase[limit.name]) for limit in phase.path_limits]
         if costates is not None and has_length(trajectory, phase):
             units = {v.name: v.unit for v in phase.state_variables}
             every += [("costate", f"costate of {name}", per(units[name]), values) for name, values in costates[phase.name].items()]

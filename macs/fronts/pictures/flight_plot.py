@@ -251,7 +251,7 @@ def draw_panel(ax: Any, drawn: Sequence[Drawn], name: str, kind: str) -> None:
         ((min(phase.t0 for phase in phases), max(phase.tf for phase in phases)), lower, upper) for (lower, upper), phases in held.items()
     ]
     draw_limits(ax, np.concatenate(values), limits)
-    ax.set_ylabel(_beside(name, getattr(owners[0], "unit", "")))
+    ax.set_ylabel(_beside(name, owners[0].unit))
     ax.set_title("; ".join(dict.fromkeys(_range(owner) for owner in owners)), loc="right", fontsize=7, color=GREY, pad=2)
 
 
