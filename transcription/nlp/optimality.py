@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -156,6 +156,13 @@ class Conditions:
         except RuntimeError:
             return None
         return cls(linear, reduced, adjoints) if np.isfinite(reduced).all() and np.isfinite(adjoints).all() else None
+
+    def alone(self, sole: np.ndarray) -> Conditions:
+        """The conditions of the objectives of a mask (m,) alone, of those that are not left out already."""
+        linear, mine = self.linear, sole[np.isfinite(self.linear.scales)]
+        columns = np.concatenate([mine, np.ones(len(linear.slack), dtype=bool)])
+        linear = replace(linear, scales=np.where(sole, linear.scales, np.inf), of_objectives=linear.of_objectives[mine])
+        return Conditions(linear, self.reduced[:, columns], self.adjoints[:, columns])
 
     @cached_property
     def residual(self) -> float:
