@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from transcription.trajectories.costates import has_length
+
 from ..io.atomic import write_whole
-from .pictures.flight_plot import has_length
 from .pictures.style import per
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from problems.compiled import Limit, Variable
+from transcription.trajectories.costates import has_length
 
 from .limits import draw_limits
 from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, per, plain, wrapped
@@ -28,10 +29,6 @@ LEAST = 1e-3
 
 FLAT = 0.02
 """Least range in which costates and the Hamiltonian are drawn, as a part of what all costates are worth: less is round-off."""
-
-
-NO_LENGTH = 1e-6
-"""Part of the whole duration that a phase lasts at most where it has no length."""
 
 
 NODES = 60
@@ -167,13 +164,6 @@ def _range_of(phase: PhaseTrajectory, name: str) -> np.ndarray:
     values, variable = phase[name], next(v for v in phase.state_variables if v.name == name)
     least = LEAST * variable.span
     return values if np.ptp(values) >= least else np.array([0.0, least])
-
-
-def has_length(trajectory: Trajectory, phase: PhaseTrajectory) -> bool:
-    """Whether a phase has a length. The multipliers of one without are no costates. If no phase has any, all count as if they had."""
-    lengths = [one.tf - one.t0 for one in trajectory.phases]
-    whole = max(one.tf for one in trajectory.phases) - min(one.t0 for one in trajectory.phases)
-    return phase.tf - phase.t0 > NO_LENGTH * whole or max(lengths) <= NO_LENGTH * whole
 
 
 def costate_ranges(trajectory: Trajectory, costates: Costates) -> dict[str | None, float]:
