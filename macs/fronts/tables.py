@@ -179,7 +179,7 @@ FEW = 5
 """Number of points whose misses are given in words, or that are named in a line."""
 VARIES = 0.05
 """Part of its terms by which a Hamiltonian that is to be constant varies where the mesh is said not to resolve the optimum: it varied by
-less on all meshes whose optimum was right to 5e-4, and by more on most that were not (`tests/macs/fronts/test_unresolved.py`)."""
+less on all meshes whose optimum was right to 5e-4, and by more on a third of the others (`tests/macs/fronts/test_unresolved.py`)."""
 
 
 def footer(front: Points) -> list[str]:
