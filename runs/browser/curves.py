@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from macs.fronts.pictures.flight_plot import costate_ranges, has_length
+from macs.fronts.pictures.flight_plot import costate_ranges
 from macs.fronts.pictures.style import per
 from problems.compiled import Limit, Variable
-from transcription.trajectories.costates import Costates, PhaseCostates
+from transcription.trajectories.costates import Costates, PhaseCostates, has_length
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 DIGITS = 6
@@ -51,7 +51,7 @@ def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list
         writer.polynomial("state", phase.state_variables, phase.state, phase.state.on_elements, jumps=False)
         writer.polynomial("control", phase.control_variables, phase.control, phase.controls_on_elements, jumps=True)
         for limit, values in zip(phase.path_limits, phase.paths.T, strict=True):
-            writer.add(limit.name, "path", "", limit, phase.time, values)
+            writer.add(limit.name, "path", limit.unit, limit, phase.time, values)
         if costates is not None and least is not None and has_length(trajectory, phase):
             _write_costates(writer, phase, costates[phase.name], least)
         found.append(

@@ -98,7 +98,7 @@ def test_curves_are_the_trajectory():
                 times, values = values_of(phase["times"][one["t"]]), values_of(one["v"])
                 inside = np.clip(times, flight.t0, flight.tf)
                 if one["kind"] == "path":
-                    assert np.allclose(values, flight[one["name"]], rtol=1e-6)
+                    assert np.allclose(values, flight[one["name"]], rtol=1e-6) and one["unit"] == "km²/s³"
                     continue
                 exact = flight.at(inside)[one["name"]]
                 near = np.abs(values - exact) <= 1e-5 * np.ptp(exact)  # times are rounded, too
