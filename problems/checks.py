@@ -117,7 +117,7 @@ def scale(value: Any, default: float, what: str) -> float:
     return default if value is None else positive(value, f"the scale of {what}")
 
 
-def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Limit:
+def limit(name: str, lower: Any, upper: Any, given_unit: Any, given_scale: Any, what: str) -> Limit:
     """A row lower <= expression <= upper, of which one side may be missing.
 
     What counts as one in it is by default the span of two limits; of one limit, or an equality, it is 1, but at least a thousandth of
@@ -132,7 +132,7 @@ def limit(name: str, lower: Any, upper: Any, given_scale: Any, what: str) -> Lim
     high = high if apart(low, high) else low
     finite = [abs(side) for side in (low, high) if math.isfinite(side)]
     default = high - low if len(finite) == 2 and high > low else max([1.0, *(1e-3 * size for size in finite)])
-    return Limit(name, low, high, scale(given_scale, default, what))
+    return Limit(name, low, high, scale(given_scale, default, what), unit(given_unit, what))
 
 
 def period(value: Any, bounds: tuple[float, float], what: str) -> float | None:

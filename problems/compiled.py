@@ -72,11 +72,13 @@ class Limit:
     lower, upper : float
     scale : float
         What counts as one in residuals.
+    unit : str
+        Of the expression: a label, for tables, pictures and files.
 
     Examples
     --------
     >>> from problems import Limit
-    >>> Limit("speed", 0.0, 5.0).upper
+    >>> Limit("speed", 0.0, 5.0, unit="m/s").upper
     5.0
     """
 
@@ -84,6 +86,8 @@ class Limit:
     lower: float
     upper: float
     scale: float = 1.0
+    # Not in the repr, of which fingerprints are made: fronts from before limits had units still belong to their problems.
+    unit: str = field(default="", repr=False)
 
 
 def verified_scale(limit: Variable | Limit) -> float:

@@ -136,19 +136,21 @@ class Phase:
         self._check_rates(rates)
         self._rates = {name: self._expression(rates[name], f"{place}: the rate of '{name}'") for name in self._states}
 
-    def path(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
+    def path(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, unit: str = "", scale: float | None = None) -> None:
         """Limit an expression all along the phase; an equality where both limits are the same.
 
         Parameters
         ----------
         lower, upper : float, optional
             At least one.
+        unit : str
+            Of the expression and its limits, for tables, pictures and files.
         scale : float, optional
             What counts as one in residuals. By default the span of two limits; of one limit, or an equality, 1 or a thousandth of its size,
             whichever is larger.
         """
         what = self._new_name("path", name)
-        self._paths[name] = checks.limit(name, lower, upper, scale, what), self._expression(expr, what)
+        self._paths[name] = checks.limit(name, lower, upper, unit, scale, what), self._expression(expr, what)
 
     def initial(self, expr: Any) -> ca.MX:
         """The value of an expression of the phase's symbols at t0, for use in objectives and constraints."""

@@ -110,10 +110,13 @@ class Problem:
         self._symbols[name] = ca.MX.sym(name)
         return self._symbols[name]
 
-    def constraint(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, scale: float | None = None) -> None:
-        """Limit an expression of `initial`, `final`, `integral`, `peak`, times and parameters of any phases; `scale` as in `Phase.path`."""
+    def constraint(self, name: str, expr: Any, *, lower: Any = None, upper: Any = None, unit: str = "", scale: float | None = None) -> None:
+        """Limit an expression of `initial`, `final`, `integral`, `peak`, times and parameters of any phases.
+
+        `unit` and `scale` are as in `Phase.path`.
+        """
         what = checks.new_name("constraint", name, self._constraints, f"problem '{self.name}'")
-        self._constraints[name] = checks.limit(name, lower, upper, scale, what), self._expression(expr, what)
+        self._constraints[name] = checks.limit(name, lower, upper, unit, scale, what), self._expression(expr, what)
 
     def link(self, first: Phase, second: Phase, *, states: Any = None) -> None:
         """Make phase `second` begin when and where phase `first` ends.

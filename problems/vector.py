@@ -60,7 +60,6 @@ class CompiledVectorProblem:
         None: as many columns as the function returns, each at most 0, with a scale of 1.
     rows : callable
         See `Rows`. A row with NaN is a failed evaluation.
-    limit_units : tuple of c str
     address, data
         As of `CompiledProblem`.
 
@@ -76,7 +75,6 @@ class CompiledVectorProblem:
     goals: tuple[Objective, ...]
     limits: tuple[Limit, ...] | None
     rows: Rows
-    limit_units: tuple[str, ...] = ()
     address: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
@@ -58,7 +58,7 @@ class VectorProblem:
         self.default_verify = 1e-6
         self._variables: dict[str, Variable] = {}
         self._objectives: dict[str, Objective] = {}
-        self._constraints: dict[str, tuple[Limit, str]] = {}
+        self._constraints: dict[str, Limit] = {}
         self._function: Outputs | None = None
 
     def __repr__(self) -> str:
@@ -77,7 +77,7 @@ class VectorProblem:
     @property
     def constraints(self) -> Mapping[str, Limit]:
         """Limits by name."""
-        return MappingProxyType({name: limit for name, (limit, _) in self._constraints.items()})
+        return MappingProxyType(self._constraints)
 
     def variable(self, name: str, *, bounds: Any, unit: str = "", period: float | None = None) -> None:
         """Add a decision variable within finite bounds; with a `period`, bounds are one period wide, and values wrap around."""
@@ -104,11 +104,11 @@ class VectorProblem:
         of two limits; of one limit, or an equality, its size, so that the violation is a fraction of it; and 1 for a limit of 0.
         """
         what = self._new_output("constraint", name)
-        limit = checks.limit(name, lower, upper, scale, what)
+        limit = checks.limit(name, lower, upper, unit, scale, what)
         sizes = [abs(side) for side in (limit.lower, limit.upper) if np.isfinite(side)]
         if scale is None and (len(sizes) == 1 or limit.lower == limit.upper):
-            limit = Limit(name, limit.lower, limit.upper, sizes[0] or 1.0)
-        self._constraints[name] = limit, checks.unit(unit, what)
+            limit = replace(limit, scale=sizes[0] or 1.0)
+        self._constraints[name] = limit
 
     def function(self, function: Kind) -> Kind:
         """Say what computes objectives and constraints: a decorator, see the class. Returns the function as it is."""
@@ -138,9 +138,8 @@ class VectorProblem:
             name=self.name,
             variables=tuple(self._variables.values()),
             goals=tuple(self._objectives.values()),
-            limits=tuple(limit for limit, _ in self._constraints.values()),
+            limits=tuple(self._constraints.values()),
             rows=NamedRows(place, self._function, tuple(self._objectives), tuple(self._constraints)),
-            limit_units=tuple(unit for _, unit in self._constraints.values()),
             address=self.address,
             data=dict(self.data),
         )

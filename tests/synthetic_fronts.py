@@ -24,7 +24,7 @@ def state_problem(name: str = "two legs", speed: float = 3.0) -> Problem:
     v = climb.state("v", bounds=(-speed, speed), initial=0.0, unit="km/s")
     u = climb.control("u", bounds=(-1.0, 1.0), unit="km/s²")
     climb.dynamics(h=v, v=u / mass)
-    climb.path("load", u * v, upper=2.0)
+    climb.path("load", u * v, upper=2.0, unit="km²/s³")
     coast = problem.phase("coast", t0=(5.0, 20.0), tf=(6.0, 40.0))
     g = coast.state("h", bounds=(0.0, 40.0), unit="km")
     coast.dynamics(h=-0.1)

@@ -41,6 +41,7 @@ class Bilevel(Evaluator):
         self.free = nlp.free
         self.lower, self.upper, self.period = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.period[nlp.free]
         self.m_known = len(nlp.problem.goals)
+        self.moves = inner.moves
         self.ways = tuple(type(one).__name__.lower() for one in inner.ways)
         self.counts = Counts()
         try:

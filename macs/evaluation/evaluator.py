@@ -152,6 +152,9 @@ class Evaluator(ABC):
         A point whose violation is at most this is feasible.
     has_gradients : bool
         Whether `descend` works.
+    moves : bool
+        Whether candidates that are not feasible are moved to points nearby. If not, what is found for them says how they violate the
+        constraints.
     ways : tuple of str
         Names of the inner solvers between which a search may choose for each batch; none where there is no choice.
     m_known : int or None
@@ -174,6 +177,7 @@ class Evaluator(ABC):
     period: np.ndarray
     tolerance: float
     has_gradients: bool = False
+    moves: bool = False
     ways: tuple[str, ...] = ()
     m_known: int | None = None
     counts: Counts

@@ -18,6 +18,7 @@ from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped, check_stopping
 from transcription.trajectories.costates import Costates
 from transcription.trajectories.limits import excursions
+from transcription.trajectories.simulate import limits_by_label
 
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..io.text import counted
@@ -27,6 +28,9 @@ from .points import Points
 
 OPTIMAL = 1e-3
 """Largest `optimality`, and largest violation, of points whose multipliers are costates."""
+
+NO_OTHERS = 1e-6
+"""Largest residual of the objectives asked for with which that of others is not sought: it is hardly less, and takes as long."""
 
 NAMED, SIDE = 3, 0.1
 """Most constraints that are named where nothing is feasible; part of the largest violation from which on others are, too."""
@@ -46,7 +50,7 @@ def trajectory_points(
     if len(archive):
         found = certified(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certify else {}
         return vectors_points(nlp, archive.Z, solver, stats, **found)
-    nearest = vectors_points(nlp, closest.Z, solver, stats)[0]
+    nearest = vectors_points(nlp, closest.Z[:1], solver, stats)[0]
     violated = conflict(nlp, nearest) if certify and _settled(stats) else nearest_violation(nearest)
     return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {violated}", closest=nearest)
 
@@ -84,13 +88,22 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
         for k, z in enumerate(Z):
             check_stopping()
             conditions = Conditions.of(nlp, z, ranges)
-            optimality[k] = float("inf") if conditions is None else conditions.residual
-            some = None if sole is None else Conditions.of(nlp, z, np.where(sole, nlp_scales(nlp) if ranges is None else ranges, np.inf))
+            some = None if sole is None else _alone(nlp, z, ranges, sole, conditions)
+            known = [one for one in (some, conditions) if one is not None]
+            small = next((one.residual for one in known if one.residual <= NO_OTHERS), None)
+            optimality[k] = min((one.residual for one in known), default=np.inf) if small is None else small
             feasible = nlp.evaluate(z[None])[1][0] <= OPTIMAL
-            best = next((one for one in (some, conditions) if feasible and one is not None and one.residual <= OPTIMAL), None)
+            best = next((one for one in known if feasible and one.residual <= OPTIMAL), None)
             multipliers = None if best is None else best.multipliers()
             found[k] = None if multipliers is None else costates(nlp, z, multipliers)
     return {"optimality": optimality, "costates": found}
+
+
+def _alone(nlp: NLP, z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray, every: Conditions | None) -> Conditions | None:
+    """The conditions of the objectives of a mask alone: from those of all or, where another has no derivatives, by themselves."""
+    if every is not None:
+        return every.alone(sole)
+    return Conditions.of(nlp, z, np.where(sole, nlp_scales(nlp) if ranges is None else ranges, np.inf))
 
 
 def vectors_points(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Points:
@@ -109,7 +122,14 @@ def nearest_violation(nearest: Point) -> str:
     if not np.isfinite(amount):
         return f"all failed: {label} is not a number"
     also = "".join(f", and {name} by {size:.2g}" for name, size in others if size > SIDE * amount)
-    return f"the nearest violates {label} by {amount:.2g} of its scale{also}"
+    return f"the nearest violates {label} by {amount:.2g} of its scale{_scale_in_unit(nearest, label)}{also}"
+
+
+def _scale_in_unit(point: Point, label: str) -> str:
+    """What counts as one in a constraint of a point, after a comma, if it has a unit."""
+    problem = point._points.problem
+    limit = limits_by_label(problem).get(label) if isinstance(problem, CompiledProblem) else None
+    return f", {limit.scale:g} {limit.unit}" if limit is not None and limit.unit else ""
 
 
 def conflict(nlp: NLP, nearest: Point) -> str:

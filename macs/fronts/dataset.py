@@ -216,7 +216,7 @@ def phase_dataset(front: Points, name: str) -> Labelled:
     variables: dict[str, tuple[Any, ...]]
     variables = {"state": first.state_variables, "control": first.control_variables, "path": first.path_limits}
     names = {kind: [v.name for v in those] for kind, those in variables.items()}
-    units = {kind: [getattr(v, "unit", "not stated") for v in those] for kind, those in variables.items()}
+    units = {kind: [v.unit for v in those] for kind, those in variables.items()}
     arrays = split(tables, names)
     arrays |= {f"{dimension}_count": _counts(rows, dimension) for dimension in LENGTHS}
     arrays |= {

@@ -161,6 +161,7 @@ def upgrade(root: Group, phases: dict[str, Group], version: int) -> tuple[Group,
     for name, phase in phases.items():
         names = {kind: phase.arrays[kind].tolist() for kind in SPLIT.values()}
         empty = variable_columns((), "state") | variable_columns((), "control") | variable_columns((), "path", limits=True)
+        del empty["path_unit"]  # Limits had no units.
         upgraded[name] = Group(empty | split(phase.arrays, names), phase.attrs, {})
     return Group(variable_columns((), "variable") | arrays, attrs, {}), upgraded
 

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from transcription.trajectories.costates import has_length
+
 from ..io.atomic import write_whole
-from .pictures.flight_plot import has_length
 from .pictures.style import per
 
 
@@ -63,7 +64,7 @@ def save_point_csv(point: Any, path: str | PathLike[str]) -> None:
         every = [("", "time", phase.time_unit, phase.time)]
         every += [("state", v.name, v.unit, phase[v.name]) for v in phase.state_variables]
         every += [("control", v.name, v.unit, phase[v.name]) for v in phase.control_variables]
-        every += [("path", limit.name, "", phase[limit.name]) for limit in phase.path_limits]
+        every += [("path", limit.name, limit.unit, phase[limit.name]) for limit in phase.path_limits]
         if costates is not None and has_length(trajectory, phase):
             units = {v.name: v.unit for v in phase.state_variables}
             every += [("costate", f"costate of {name}", per(units[name]), values) for name, values in costates[phase.name].items()]

@@ -186,9 +186,9 @@ def with_nearest(points: Kind) -> Kind:
     violations = evaluated_again(problem, nearest.decision[None])[2]
     closest = nearest.alone().replace(violations=violations)[0]
     name = max(violations[0], key=lambda name: violations[0][name])
-    limit, unit = next(both for both in zip(problem.limits or (), problem.limit_units, strict=True) if both[0].name == name)
+    limit = next(one for one in problem.limits or () if one.name == name)
     before = points.message.rpartition("; ")[0]
-    message = f"{before}; the nearest violates {name} by {closest.violation:.2g} of its scale, {limit.scale:g} {unit}".rstrip()
+    message = f"{before}; the nearest violates {name} by {closest.violation:.2g} of its scale, {limit.scale:g} {limit.unit}".rstrip()
     return points.replace(closest=closest, message=message, stats={**points.stats, **_more_rows(points, 1)})
 
 

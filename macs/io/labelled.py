@@ -87,43 +87,41 @@ def distinct(names: Sequence[Any], what: str) -> None:
 
 
 def variable_table(dimension: str, what: str, limits: bool = False) -> dict[str, Column]:
-    """The columns of `variable_columns`."""
-    units = "not stated" if limits else f"see {dimension}_unit"
-    along = (dimension,)
+    """The columns of `variable_columns`. The unit of limits is optional: there are files from before limits had one."""
+    along, units = (dimension,), f"see {dimension}_unit"
     table = {
         dimension: Column(along, TEXT, f"name of the {what}"),
         f"{dimension}_lower": Column(along, NUMBER, f"lower bound of the {what}", units),
         f"{dimension}_upper": Column(along, NUMBER, f"upper bound of the {what}", units),
         f"{dimension}_scale": Column(along, NUMBER, f"scale of the {what}", units),
+        f"{dimension}_unit": Column(along, TEXT, f"unit of the {what}", optional=limits),
     }
     if not limits:
-        table[f"{dimension}_unit"] = Column(along, TEXT, f"unit of the {what}")
         table[f"{dimension}_period"] = Column(along, NUMBER, f"period of the {what}, NaN if it is not periodic", units)
     return table
 
 
 def variable_columns(variables: Sequence[Variable | Limit], dimension: str, limits: bool = False) -> dict[str, np.ndarray]:
-    """Names, bounds and scales along a dimension; of variables, units and periods too."""
+    """Names, bounds, scales and units along a dimension; of variables, periods too."""
     columns = {
         dimension: words([v.name for v in variables]),
         f"{dimension}_lower": np.array([v.lower for v in variables], dtype=float),
         f"{dimension}_upper": np.array([v.upper for v in variables], dtype=float),
         f"{dimension}_scale": np.array([v.scale for v in variables], dtype=float),
+        f"{dimension}_unit": words([v.unit for v in variables]),
     }
     if not limits:
         periods = [getattr(v, "period", None) for v in variables]
-        columns[f"{dimension}_unit"] = words([getattr(v, "unit", "") for v in variables])
         columns[f"{dimension}_period"] = np.array([np.nan if period is None else period for period in periods], dtype=float)
     return columns
 
 
 def read_variables(data: Labelled, dimension: str) -> tuple[Variable, ...]:
     """Variables from their `variable_columns`. Raises ValueError for bounds, a scale or a period that are none."""
-    units, periods = data[f"{dimension}_unit"].tolist(), data[f"{dimension}_period"].tolist()
-    rows = zip(read_limits(data, dimension), units, periods, strict=True)
+    rows = zip(read_limits(data, dimension), data[f"{dimension}_period"].tolist(), strict=True)
     if not np.all(np.isnan(data[f"{dimension}_period"]) | (data[f"{dimension}_period"] > 0)):
         raise ValueError(f"'{dimension}_period' has a period that is not above 0")
-    return tuple(Variable(v.name, v.lower, v.upper, unit, v.scale, None if np.isnan(period) else period) for v, unit, period in rows)
+    return tuple(Variable(v.name, v.lower, v.upper, v.unit, v.scale, None if np.isnan(period) else period) for v, period in rows)
 
 
 def read_limits(data: Labelled, dimension: str) -> tuple[Limit, ...]:
@@ -133,7 +131,8 @@ def read_limits(data: Labelled, dimension: str) -> tuple[Limit, ...]:
     for wrong, why in ((~(lower <= upper), "bounds that are no interval"), (~(scale > 0), "a scale that is not above 0")):
         if wrong.any():
             raise ValueError(f"the {dimension} '{names[int(np.argmax(wrong))]}' has {why}")
-    return tuple(Limit(*row) for row in zip(names, lower.tolist(), upper.tolist(), scale.tolist(), strict=True))
+    units = data[f"{dimension}_unit"].tolist() if f"{dimension}_unit" in data.arrays else [""] * len(names)
+    return tuple(Limit(*row) for row in zip(names, lower.tolist(), upper.tolist(), scale.tolist(), units, strict=True))
 
 
 def named_table(name: str, dimension: str, what: str, entry: str) -> dict[str, Column]:

@@ -8,12 +8,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..io.text import counted
-from .dominance import nondominated, worthwhile
+from .dominance import dominates, nondominated, worthwhile
 from .energy import Guide, spread
 from .niches import MANY, best_of_niches
 
 CURVE = 2
-"""With more than so many objectives, points far from the front can be non-dominated for ever, see `worthwhile`."""
+"""Number of objectives up to which a front is a curve. With more, points far from it can be non-dominated for ever, see `worthwhile`."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -102,19 +102,47 @@ def insert(
     offered = np.flatnonzero((violation <= tolerance) & np.isfinite(F).all(axis=1))
     if not offered.size:
         return archive
-    every = archive.joined(Archive(Z[offered], F[offered], violation[offered]))
-    keep = np.flatnonzero(nondominated(every.F))
+    return _thinned(archive.joined(Archive(Z[offered], F[offered], violation[offered])), len(archive), limit, exponent, guide)
+
+
+def outside(
+    known: Archive, archive: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray, *, limit: int, tolerance: float
+) -> Archive:
+    """The infeasible points, at most `limit`, that no point of the archive dominates, non-dominated among themselves by their objectives,
+    of `known` and of the points Z (k, D), F (k, m), violation (k,).
+
+    They may lead to feasible points that are better than those of the archive, behind what is infeasible (Li, Chen, Fu and Yao 2019).
+    """
+    offered = np.flatnonzero((violation > tolerance) & np.isfinite(violation) & np.isfinite(F).all(axis=1))
+    both = known.joined(Archive(Z[offered], F[offered], violation[offered]))
+    free = np.flatnonzero(~np.any(dominates(archive.F[:, None], both.F), axis=0))
+    return _thinned(both.take(free), int((free < len(known)).sum()), limit)
+
+
+def _thinned(points: Archive, known: int, limit: int, exponent: float | None = None, guide: Guide | None = None) -> Archive:
+    """The non-dominated points, thinned to the limit; the first are `known` already."""
+    keep = np.flatnonzero(nondominated(points.F))
     even = exponent is None and guide is None
-    if len(keep) > limit and even and CURVE < every.F.shape[1] <= MANY:
-        keep = keep[worthwhile(every.F[keep])]
+    if len(keep) > limit and even and CURVE < points.F.shape[1] <= MANY:
+        keep = keep[worthwhile(points.F[keep])]
     if len(keep) > limit:
-        F = every.F[keep]
+        F = points.F[keep]
         niches = even and F.shape[1] > MANY
-        keep = keep[best_of_niches(F, limit) if niches else spread(F, limit, keep < len(archive), exponent, guide)]
-    return every.take(keep)
+        keep = keep[best_of_niches(F, limit) if niches else spread(F, limit, keep < known, exponent, guide)]
+    return points.take(keep)
 
 
-def least_violated(closest: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray) -> Archive:
-    """The least violated point, one row, of `closest` and the points Z (k, D), F (k, m), violation (k,); of equal ones the first."""
+def least_violated(closest: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray, limit: int = 1) -> Archive:
+    """The least violated points, at most `limit`, of `closest` and the points Z (k, D), F (k, m), violation (k,), in this order; of equal
+    ones the first. The first row is there even if all evaluations failed, the others have finite violations."""
     every = closest.joined(Archive(Z, F, violation))
-    return every.take(np.argsort(every.violation, kind="stable")[:1])
+    order = np.argsort(every.violation, kind="stable")
+    kept = [order[0]] if len(order) else []
+    known = {every.Z[row].tobytes() for row in kept}
+    for row in order[1:]:
+        if len(kept) >= limit or not np.isfinite(every.violation[row]):
+            break
+        if (place := every.Z[row].tobytes()) not in known:
+            known.add(place)
+            kept.append(row)
+    return every.take(np.array(kept, dtype=int))

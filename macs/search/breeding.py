@@ -7,15 +7,20 @@ with at most three objectives those more often whose offspring the archive keeps
 
 With more objectives nearly every new point is non-dominated, and a point elsewhere on a poor front stays as long as one nearer to the true
 front: what stays says little of progress. The shares are then fixed, most of them crossover's, and mates are drawn from the whole archive.
+
+As long as nothing is feasible the archive is empty, and the least violated points are bred likewise: they are ordered by one number, and a
+generation of children with coordinates of both parents lowers it sooner than steps of single agents. Later, infeasible points with better
+objectives than the archive's are bred with it: feasible parts may be apart from each other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..evaluation.box import Box
+from ..pareto.archive import CURVE
 from ..pareto.niches import MANY
 from .state import remember
 from .trials import Trials
@@ -41,8 +46,8 @@ FROM_MATE = 0.25
 """Part of the crossed coordinates in which a child is near the mate."""
 
 
-INDEX_MANY, FROM_MATE_MANY = 30.0, 0.5
-"""The same of crossover with many objectives (Deb and Jain 2014)."""
+INDEX_SURFACE, FROM_MATE_SURFACE = 30.0, 0.5
+"""The same of crossover with three and more objectives, and as long as nothing is feasible (Deb and Jain 2014)."""
 
 
 LEAST_SHARE, FORGET = 0.05, 0.1
@@ -91,9 +96,9 @@ def crossover(
     return X + np.where(rng.random(X.shape) < 0.5, share * box.difference(mates[0], X), 0.0)
 
 
-def crossover_many(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Children (k, d) by crossover as it suits many objectives: nearer to both parents, and from both alike."""
-    return crossover(box, X, mates, rng, INDEX_MANY, FROM_MATE_MANY)
+def even_crossover(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Children (k, d) by crossover that are nearer to the parents, and have coordinates of both alike."""
+    return crossover(box, X, mates, rng, INDEX_SURFACE, FROM_MATE_SURFACE)
 
 
 def differential(box: Box, X: np.ndarray, mates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -121,12 +126,12 @@ OPERATORS: tuple[tuple[Operator, bool], ...] = ((crossover, True), (differential
 """The operators, each with whether its offspring also mutate."""
 
 
-OPERATORS_MANY: tuple[tuple[Operator, bool], ...] = ((crossover_many, True), *OPERATORS[1:])
-"""The same with many objectives."""
+OPERATORS_SURFACE: tuple[tuple[Operator, bool], ...] = ((even_crossover, True), *OPERATORS[1:])
+"""The same where a front is a surface, and as long as nothing is feasible."""
 
 
-SHARES_MANY = np.array([1.0 - (len(OPERATORS_MANY) - 1) * LEAST_SHARE] + [LEAST_SHARE] * (len(OPERATORS_MANY) - 1))
-"""Shares of the operators with many objectives."""
+SHARES = np.array([1.0 - (len(OPERATORS) - 1) * LEAST_SHARE] + [LEAST_SHARE] * (len(OPERATORS) - 1))
+"""Fixed shares of the operators."""
 
 
 def no_credit(count: int) -> np.ndarray:
@@ -163,7 +168,13 @@ def mutate(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def breed(
-    box: Box, X: np.ndarray, pool: np.ndarray, shares: np.ndarray, rng: np.random.Generator, many: bool = False
+    box: Box,
+    X: np.ndarray,
+    pool: np.ndarray,
+    shares: np.ndarray,
+    rng: np.random.Generator,
+    operators: Sequence[tuple[Operator, bool]] = OPERATORS,
+    wide: float = WIDE,
 ) -> tuple[np.ndarray, np.ndarray]:
     """One offspring of each parent, and the operator that made it.
 
@@ -177,20 +188,22 @@ def breed(
     shares : array (number of operators,)
         Probabilities of the operators.
     rng : numpy.random.Generator
-    many : bool
-        Whether the objectives are many, see `OPERATORS_MANY`.
+    operators : sequence
+        `OPERATORS` or `OPERATORS_SURFACE`.
+    wide : float
+        See `mates`.
 
     Returns
     -------
     array (k, d)
         The offspring, inside the box.
     array (k,) of int
-        Row in `OPERATORS` of the operator that made each.
+        Row in `operators` of the operator that made each.
     """
-    operator = rng.choice(len(OPERATORS), size=len(X), p=shares)
-    others = mates(box, X, pool, rng, 1.0 if many else WIDE)
+    operator = rng.choice(len(operators), size=len(X), p=shares)
+    others = mates(box, X, pool, rng, wide)
     trial = X.copy()
-    for index, (propose, mutates) in enumerate(OPERATORS_MANY if many else OPERATORS):
+    for index, (propose, mutates) in enumerate(operators):
         rows = np.flatnonzero(operator == index)
         if rows.size:
             children = propose(box, X[rows], others[:, rows], rng)
@@ -204,24 +217,34 @@ def _moving_coordinates(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def breed_archive(trials: Trials) -> None:
-    """Breed offspring of the archive's points, from as many parents as possible; update the credit of the operators, unless shares are
-    fixed."""
+    """Breed offspring of the archive's points, or of the least violated ones as long as nothing is feasible, from as many parents as
+    possible, and one of each point outside; update the credit of the operators, unless shares are fixed."""
     state, settings, evaluator, box = trials.state, trials.settings, trials.evaluator, trials.box
-    archive, rng = state.archive, state.rng
+    parents, m, rng = state.parents, len(state.ideal), state.rng
     lone = min(max(len(state.agents) - settings.agents, 0), settings.agents)
-    count = settings.offspring(len(archive), archive.F.shape[1], lone)
+    count = settings.offspring(len(parents), m, lone, len(state.archive) > 0)
     if not count:
         return
-    rounds = [rng.permutation(len(archive)) for _ in range(-(-count // len(archive)))]
+    rounds = [rng.permutation(len(parents)) for _ in range(-(-count // len(parents)))]
     rows = np.concatenate(rounds)[:count]
-    points = box.to_unit(archive.Z[:, evaluator.free])
+    rows = np.concatenate([rows, len(parents) + np.arange(len(state.outside))])
+    parents = parents.joined(state.outside)
+    points = box.to_unit(parents.Z[:, evaluator.free])
     pool = points if len(points) > FEW else np.vstack([points, trials.positions()])
-    many = archive.F.shape[1] > MANY
-    trial, operator = breed(box, points[rows], pool, SHARES_MANY if many else operator_shares(state.credit), rng, many)
-    bred, result = trials.evaluate(archive.Z[rows], points[rows], trial)
+    fixed = m > MANY or not len(state.archive)
+    trial, operator = breed(
+        box,
+        points[rows],
+        pool,
+        SHARES if fixed else operator_shares(state.credit),
+        rng,
+        OPERATORS_SURFACE if fixed or m > CURVE else OPERATORS,
+        1.0 if fixed else WIDE,
+    )
+    bred, result = trials.evaluate(parents.Z[rows], points[rows], trial)
     if result is None:
         return
     remember(state, trials.seen, settings, evaluator)
-    if not many:
-        kept = (result.F[:, None] == state.archive.F).all(axis=2).any(axis=1)
+    if not fixed:
+        kept = (result.F[:, None] == np.vstack([state.archive.F, state.outside.F])).all(axis=2).any(axis=1)
         state.credit = updated_credit(state.credit, operator[bred], kept)

@@ -114,7 +114,7 @@ def individual_actions(trials: Trials) -> None:
 
     attempt(along_velocity, settings.keep_velocity)
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
-    scanned = settings.coordinates_to_scan(d, len(state.archive), state.directions.shape[1], trials.planned)
+    scanned = settings.coordinates_to_scan(d, len(state.parents), state.directions.shape[1], trials.planned)
     for coordinate in order.T[:scanned]:
         length = rng.random((2, count)) ** settings.concentration * agents.rho / 2
         side = rng.choice([-1.0, 1.0], count)

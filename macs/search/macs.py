@@ -99,6 +99,7 @@ class MACS(Settings, Solver):
             agents=agents_at(seen, np.arange(0), len(evaluator.free), self),
             archive=Archive.of(seen, np.arange(0)),
             closest=Archive.of(seen, np.arange(0)),
+            outside=Archive.of(seen, np.arange(0)),
             ideal=np.full(m, np.nan),
             nadir=np.full(m, np.nan),
             directions=directions.pool(m, self.directions or 100 * m),

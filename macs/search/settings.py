@@ -12,12 +12,13 @@ import numpy as np
 from problems.checks import check_choice, check_count, check_interval
 from transcription.catalogue import parse
 
+from ..pareto.archive import CURVE
 from ..pareto.niches import MANY
 from ..preferences.catalogue import from_dict
 from ..preferences.preference import Preference
 
-FEW_OBJECTIVES, MANY_OBJECTIVES = 0.15, 1.0
-"""Default of `breeding` with at most three objectives, and with more."""
+SOME, GENERATION, GENERATIONS = 0.15, 1.0, 2.0
+"""Defaults of `breeding`: few offspring, which leave most of the budget to the agents; one of each point; two of each."""
 FEW_POINTS = 10
 """Points of an archive up to which, by default, all agents have a direction."""
 LONG, ALONE = 30_000, 6000
@@ -107,8 +108,9 @@ class Settings:
     coordinates : float, default 1.0
         Fraction of the coordinates that pattern search tries, in (0, 1], if `adaptive_coordinates` is off (Table I: 1).
     adaptive_coordinates : bool, default True
-        Pattern search tries all coordinates while the archive is empty, and one when it is full (the authors' later code). An iteration
-        takes at most an eighth of the budget for it.
+        Pattern search tries all coordinates while the archive is empty, and one when it is full (the authors' later code). As long as
+        nothing is feasible the least violated points, as many as the archive may have, stand for it. An iteration takes at most an eighth
+        of the budget for it.
     lone : int, optional
         Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead; in an
         iteration as many of them act as there are `agents`. So they
@@ -146,8 +148,10 @@ class Settings:
         points between them, with which a search begins if it chooses its inner level, or if none of its first candidates is feasible.
     breeding : float, optional
         Number of offspring of each point of the archive in an iteration, in [0, 10]; if positive, at least as many offspring as agents.
-        More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15, and 1 with more than
-        three objectives. 0 in the paper.
+        More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15 with up to two
+        objectives, and with three where there are `lone` agents; otherwise 1; and 2 as long as nothing is feasible. If positive,
+        infeasible points with better objectives than the archive's have one child each, where the inner level does not move candidates.
+        0 in the paper.
     sample : int, optional
         Number of points of the first population, at least that of the agents. Default: the size of the archive, but at most a twentieth of
         the budget and at least the number of agents. In the paper: the number of agents.
@@ -306,11 +310,12 @@ class Settings:
         """Number of points of the first population."""
         return max(self.agents, min(self.archive, budget // 20)) if self.sample is None else self.sample
 
-    def offspring(self, archived: int, m: int, lone: int = 0) -> int:
-        """Number of offspring in an iteration of an archive with so many points, of m objectives, in which so many lone agents act;
-        0 if it is empty."""
-        each = (FEW_OBJECTIVES if m <= MANY else MANY_OBJECTIVES) if self.breeding is None else self.breeding
-        return max(self.agents + lone, round(each * archived)) if each and archived else 0
+    def offspring(self, parents: int, m: int, lone: int = 0, feasible: bool = True) -> int:
+        """Number of offspring of so many parents in an iteration, with m objectives, in which so many lone agents act; 0 without
+        parents."""
+        each = SOME if m <= CURVE or (m <= MANY and lone > 0) else GENERATION
+        each = (each if feasible else GENERATIONS) if self.breeding is None else self.breeding
+        return max(self.agents + lone, round(each * parents)) if each and parents else 0
 
     def social_agents(self, m: int) -> int:
         """Number of agents with a direction, for m objectives: 0 if they are too few for all orthogonal directions."""

@@ -97,7 +97,10 @@ class SearchState:
     agents : Agents
     archive : Archive
     closest : Archive
-        The least violated point evaluated, one row, as long as no point was feasible; no row once the archive has points.
+        The least violated points evaluated, at most as many as the archive may have, the best first, as long as no point was feasible;
+        no row once the archive has points.
+    outside : Archive
+        Infeasible points with better objectives than the archive's, see `archive.outside`; none where the inner level moves candidates.
     ideal, nadir : arrays (m,)
         Best feasible values ever evaluated; worst values in the archive. NaN as long as no point was feasible.
     directions : array (k, m)
@@ -139,6 +142,7 @@ class SearchState:
     agents: Agents
     archive: Archive
     closest: Archive
+    outside: Archive
     ideal: np.ndarray
     nadir: np.ndarray
     directions: np.ndarray
@@ -158,6 +162,11 @@ class SearchState:
     in_vain: np.ndarray | None = None
     rounds: Rounds | None = None
 
+    @property
+    def parents(self) -> Archive:
+        """The points that are bred: the archive, or the least violated points as long as it is empty."""
+        return self.archive if len(self.archive) else self.closest
+
     def learn(self, optima: Archive) -> None:
         """Keep those of these optima, and of the known ones, that are non-dominated."""
         both = self.optima.joined(optima)
@@ -169,7 +178,7 @@ class SearchState:
 
 
 def remember(state: SearchState, seen: list[Evaluation], settings: Settings, evaluator: Evaluator) -> None:
-    """Offer evaluated points to the archive and update ideal and nadir; as long as none is feasible, update the least violated point."""
+    """Offer evaluated points to the archive and update ideal and nadir; as long as none is feasible, update the least violated points."""
     if not seen:
         return
     Z, F = np.vstack([e.Z for e in seen]), np.vstack([e.F for e in seen])
@@ -182,9 +191,12 @@ def remember(state: SearchState, seen: list[Evaluation], settings: Settings, eva
     if len(state.archive):
         state.ideal = np.fmin(state.ideal, state.archive.F.min(axis=0))
         state.nadir = state.archive.F.max(axis=0)
+        if settings.breeding != 0.0 and not evaluator.moves:
+            known = state.outside.joined(state.closest)
+            state.outside = archives.outside(known, state.archive, Z, F, violation, limit=limit, tolerance=tolerance)
         state.closest = state.closest.take(np.arange(0))
         return
-    state.closest = archives.least_violated(state.closest, Z, F, violation)
+    state.closest = archives.least_violated(state.closest, Z, F, violation, limit)
     state.hopeless += sum(e.status.tolist().count(INFEASIBLE) for e in seen if e.fallbacks)
 
 

@@ -41,7 +41,7 @@ def betts(name: str, heating_rate: float | None = None) -> Problem:
     phase.dynamics(**SHUTTLE.rates(states, attack, bank, MASS))
     if heating_rate is not None:
         heating = SHUTTLE.heating_rate(states["altitude"], states["speed"], attack)
-        phase.path("heating rate", heating, upper=heating_rate, scale=heating_rate)
+        phase.path("heating rate", heating, upper=heating_rate, unit="Btu/ft2/s", scale=heating_rate)
     problem.maximize("cross-range", degrees(1.0) * phase.final(states["latitude"]), unit="deg")
     guess(phase, START, FINAL_GUESS, dict(zip(ANGLES, (ATTACK, BANK), strict=True)))
     phase.guess(tf=FINAL_GUESS)

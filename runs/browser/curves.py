@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from macs.fronts.pictures.flight_plot import costate_ranges, has_length
+from macs.fronts.pictures.flight_plot import costate_ranges
 from macs.fronts.pictures.style import per
 from problems.compiled import Limit, Variable
-from transcription.trajectories.costates import Costates, PhaseCostates
+from transcription.trajectories.costates import Costates, PhaseCostates, has_length
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 DIGITS = 6
 """Digits of the range of a curve to which its values are rounded."""
 MOST_DIGITS = 10
 """Digits of its largest value that are kept at most: the rest is round-off."""
+ORDER = 3
+"""Differences that are taken of the values of a curve: they are small where it is smooth, and take a third of the room."""
 FINEST, COARSEST = 41, 3
 """Samples of a polynomial on one element, both ends included; of a constant or a straight line there are two."""
 
@@ -38,9 +40,9 @@ def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list
     -------
     list of dict
         Of each phase "name", "unit" (of time), "t0", "tf", "lasts" (False: it has no length, and no costates), "elements" (their
-        number), "times" (lists of times) and "quantities". A quantity has "name", "kind" ("state", "control", "path", "costate" or
-        "hamiltonian"), "unit" (of costates and the Hamiltonian what they are per, such as "per km"), "lower" and "upper" (None where there
-        is no limit), "least" (the least range that means anything), "t" (which of the "times") and "v" (values, None in gaps).
+        number), "times" and "quantities". A quantity has "name", "kind" ("state", "control", "path", "costate" or "hamiltonian"), "unit"
+        (of costates and the Hamiltonian what they are per, such as "per km"), "lower" and "upper" (None where there is no limit), "least"
+        (the least range that means anything), "t" (which of the "times") and "v" (values). Times and values are as `differences` has them.
     """
     found = []
     least = None if costates is None else costate_ranges(trajectory, costates)
@@ -49,7 +51,7 @@ def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list
         writer.polynomial("state", phase.state_variables, phase.state, phase.state.on_elements, jumps=False)
         writer.polynomial("control", phase.control_variables, phase.control, phase.controls_on_elements, jumps=True)
         for limit, values in zip(phase.path_limits, phase.paths.T, strict=True):
-            writer.add(limit.name, "path", "", limit, phase.time, values)
+            writer.add(limit.name, "path", limit.unit, limit, phase.time, values)
         if costates is not None and least is not None and has_length(trajectory, phase):
             _write_costates(writer, phase, costates[phase.name], least)
         found.append(
@@ -86,7 +88,7 @@ class _Writer:
     """Collects the quantities of a phase; curves with the same times share them."""
 
     def __init__(self, most: int) -> None:
-        self.times: list[list[float | None]] = []
+        self.times: list[list[int | None]] = []
         self.quantities: list[dict[str, Any]] = []
         self._most = most
         self._known: dict[bytes, int] = {}
@@ -122,7 +124,7 @@ class _Writer:
         key = t.tobytes()
         if key not in self._known:
             self._known[key] = len(self.times)
-            self.times.append(rounded(t))
+            self.times.append(differences(t))
         lower, upper = (float(bound) if np.isfinite(bound) else None for bound in (limits.lower, limits.upper))
         self.quantities.append(
             {
@@ -133,7 +135,7 @@ class _Writer:
                 "upper": upper,
                 "least": least,
                 "t": self._known[key],
-                "v": rounded(v),
+                "v": differences(v),
             }
         )
 
@@ -153,15 +155,23 @@ def thinned(values: np.ndarray, most: int) -> np.ndarray:
     return np.array(sorted(kept))
 
 
-def rounded(values: np.ndarray) -> list[float | None]:
-    """Values as plain numbers, with `DIGITS` digits of their range; None for what is not finite."""
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return [None] * len(values)
-    span, largest = float(np.ptp(finite)), float(np.abs(finite).max())
+def differences(values: np.ndarray) -> list[int | None]:
+    """Values with `DIGITS` digits of their range, as whole numbers that take little room.
+
+    The first of them is the number of decimals, which may be negative. Then follow the differences of order `ORDER` of the values times
+    that power of ten, as if zeros came before the first: cumulative sums, taken so many times, are the values again. None stands for a
+    value that is not finite; differences pass over it.
+    """
+    finite = np.isfinite(values)
+    known = values[finite]
+    span, largest = (float(np.ptp(known)), float(np.abs(known).max())) if len(known) else (0.0, 0.0)
     unit = max(span * 10.0**-DIGITS, largest * 10.0**-MOST_DIGITS)
     decimals = int(np.clip(-np.floor(np.log10(unit)), -300, 300)) if unit > 0 else 0
-    return [value if np.isfinite(value) else None for value in np.round(values, decimals).tolist()]
+    whole = np.rint(known * 10.0**decimals).astype(np.int64)
+    for _ in range(ORDER):
+        whole = np.diff(whole, prepend=0)
+    steps = iter(whole.tolist())
+    return [decimals, *(next(steps) if is_known else None for is_known in finite)]
 
 
 def _without_wraps(t: np.ndarray, v: np.ndarray, period: float | None) -> tuple[np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ from synthetic_fronts import black_box
 
 from macs import MACS, Front, optimize, sweep
 from macs.fronts import files
+from macs.fronts.builders import certified
 from macs.fronts.dataset import phase_dataset, root_dataset
 from macs.fronts.points import Points
 from macs.io.atomic import sealed, unsealed
@@ -20,6 +21,7 @@ from problems import Problem, load
 from problems.cases import goddard
 from runs.cli import main
 from transcription import parse
+from transcription.nlp import optimality
 
 
 @pytest.fixture(scope="module")
@@ -268,6 +270,22 @@ def test_a_picture_shows_them_below(ascents):
     low, high = axes[5].get_ylim()
     assert high - low > 1e-5
     assert len(ascents.replace(costates=[None] * len(ascents))[3].plot(costates=True)) == 5
+
+
+def test_the_objective_that_was_asked_for_is_certified_by_itself_if_it_can_be(monkeypatch):
+    """Others are then not looked at, which would take as long; where that is no optimum of it alone, all are."""
+    method, asked = parse("dfet:4x6"), np.array([False, True])
+    nlp, looked = method.transcribe(load("goddard")), []
+    least = optimality._least
+    monkeypatch.setattr(optimality, "_least", lambda A, slack, *more: looked.append(A.shape[1] - len(slack)) or least(A, slack, *more))
+    end = optimize(load("goddard"), method, objective="horizontal speed", starts=1)
+    assert set(looked) == {1} and end.optimality < 1e-9 and end.weights["flight time"] == 0.0
+    middle = sweep(load("goddard"), method, points=3, starts=1)[1]
+    looked.clear()
+    found = certified(nlp, middle.decision[None], None, asked)
+    assert 2 in looked and found["optimality"][0] < 1e-6
+    assert optimality.Conditions.of(nlp, middle.decision).alone(asked).residual > 1e-3
+    assert min(found["costates"][0].weights) > 0.0
 
 
 def test_the_command_line_names_the_weights(ascents, tmp_path, capsys):

@@ -223,6 +223,24 @@ def test_signs_are_those_of_the_senses():
     assert [(goal.name, goal.sense, goal.unit) for goal in compiled.goals] == [("time", "minimize", ""), ("late", "maximize", "s")]
 
 
+def test_limits_have_units_which_are_labels():
+    """They change no fingerprint: fronts from before limits had units still belong to their problems."""
+
+    def limited(**units):
+        problem, phase = glider()
+        phase.path("load", phase["flap"], upper=3, **units)
+        problem.constraint("fuel", phase.tf, upper=5, **units)
+        return problem.compile()
+
+    with_units, without = limited(unit="kN"), limited()
+    assert [one.unit for one in (*with_units.phases[0].paths, *with_units.limits)] == ["kN", "kN"]
+    assert [one.unit for one in (*without.phases[0].paths, *without.limits)] == ["", ""]
+    assert with_units.fingerprint == without.fingerprint
+    problem, phase = glider()
+    refused(lambda: phase.path("load", phase["flap"], upper=1, unit=3), "load", "unit", "string")
+    refused(lambda: problem.constraint("fuel", phase.tf, upper=1, unit="a\0b"), "fuel", "unit", "NUL")
+
+
 def test_default_scales_are_spans():
     problem, phase = glider()
     phase.path("load", phase["flap"], lower=-2, upper=3)

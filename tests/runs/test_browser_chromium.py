@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
-from chromium import NEEDS_CHROMIUM, errors, started, wait
+from chromium import NEEDS_CHROMIUM, errors, opened_alone, wait
 from synthetic_fronts import black_box, flights, marked
 
 from runs.browser import page as pages
+from runs.browser.curves import differences
 from runs.browser.front_page import front_page
 from runs.browser.points import about, columns, details, goals_data, samples_of
 
@@ -47,6 +49,11 @@ def test_a_click_selects_a_point_and_shows_its_trajectory(browser, tmp_path):
     wait(browser, "document.querySelector('.panel-plot').data")
     last = browser.execute_script("return document.querySelector('.panel-plot').data[0].y.at(-1)")
     assert last == pytest.approx(front[index].trajectory["climb"].edge_states[-1, 0], rel=1e-5)
+    times, heights = browser.execute_script("const { x, y } = document.querySelector('.panel-plot').data[0]; return [x, y]")
+    assert heights == pytest.approx(front[index].trajectory["climb"].at(np.array(times))["h"], rel=1e-5)
+    values = np.array([-3.5e14, 0.0, np.nan, 2.25e14])
+    told = browser.execute_script("return curveValues(arguments[0])", differences(values))
+    assert np.array(told, dtype=float) == pytest.approx(values, nan_ok=True)
     assert browser.execute_script("return document.querySelectorAll('#table tr[aria-selected=true]').length") == 1
     assert errors(browser) == []
 
@@ -135,29 +142,59 @@ def study_like(runs: int, points: int) -> bytes:
     return pages.page(data, {str(k): packed for k in range(runs)})
 
 
+def package_alone() -> bytes:
+    """A page with nothing but a figure of three points, and the drawing package as it comes."""
+    from plotly.offline import get_plotlyjs
+
+    draw = "Plotly.newPlot('plot', [{ x: [1, 2, 3], y: [1, 2, 3] }]).then(() => { document.documentElement.dataset.ready = 'yes'; });"
+    body = f'<div id="plot"></div><script>{get_plotlyjs()}</script><script>{draw}</script>'
+    return f'<!DOCTYPE html><html><head><meta charset="utf-8"></head><body>{body}</body></html>'.encode()
+
+
 @pytest.mark.slow
-def test_a_hundred_runs_of_a_hundred_points_open_in_two_seconds(tmp_path):
-    pages_of = {"few": front_page(flights(10)), "many": study_like(100, 100)}
-    seconds: dict[str, list[float]] = {"few": [], "many": []}
-    worked: dict[str, list[float]] = {"few": [], "many": []}
-    for _ in range(2):
-        for name, content in pages_of.items():
-            browser = started()  # a new one, as it keeps what it has compiled
-            try:
-                browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
-                opened(browser, tmp_path, content)
-                seconds[name].append(browser.execute_script("return performance.now()") / 1000)
-                measured = browser.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
-                worked[name].append(next(one["value"] for one in measured if one["name"] == "TaskDuration"))
-                assert browser.execute_script("return state.points.length") == {"few": 10, "many": 10_000}[name]
-                assert errors(browser) == []
-            finally:
-                browser.quit()
-    # Two seconds, or on a machine that others work on at most twice the work of a page of ten points, most of which is to read the
-    # drawing package.
-    assert min(seconds["many"]) < 2.0 or min(worked["many"]) < 2.0 * min(worked["few"]), (seconds, worked)
-    few, many = ([min(measured[name]) for measured in (seconds, worked)] for name in pages_of)
-    print(f"10 points: {few[0]:.2f} s, {few[1]:.2f} s of work; 10 000: {many[0]:.2f} s, {many[1]:.2f} s")
+def test_a_hundred_runs_of_a_hundred_points_open_with_the_work_of_the_drawing_package(tmp_path):
+    contents = {"package alone": package_alone(), "10 points": front_page(flights(10)), "10 000 points": study_like(100, 100)}
+    assert len(contents["10 000 points"]) < 15e6
+    found: dict[str, list[tuple[float, float]]] = {name: [] for name in contents}
+    for _ in range(3):
+        for name, content in contents.items():
+            path = tmp_path / "page.html"
+            path.write_bytes(content)
+            seconds, work, errors = opened_alone(path)  # a new browser, as it keeps what it has compiled
+            assert errors == []
+            found[name].append((seconds, work))
+    seconds, work = ({name: np.median([one[k] for one in all_]) for name, all_ in found.items()} for k in (0, 1))
+    for name in contents:
+        print(f"{name}: {seconds[name]:.2f} s until the figure is there, {work[name]:.2f} s of work on the main thread")
+    # Two seconds are asked for: on two idle cores it took 1.2 s with this work. On a busy machine seconds say nothing of the page.
+    assert work["10 000 points"] < 1.25 * work["package alone"]
+    assert work["10 points"] < 0.85 * work["package alone"]
+
+
+@pytest.mark.slow
+def test_a_page_has_its_figures_once_it_is_loaded(browser, tmp_path):
+    """Programs that print pages or take pictures of them wait for that."""
+    marks = "addEventListener('load', () => { window.drawnOnceLoaded = document.documentElement.dataset.ready; })"
+    added = browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": marks})
+    try:
+        opened(browser, tmp_path, front_page(flights(3)))
+        wait(browser, "document.readyState === 'complete' && 'drawnOnceLoaded' in window")
+    finally:
+        browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", {"identifier": added["identifier"]})
+    assert browser.execute_script("return window.drawnOnceLoaded") == "yes"
+    assert browser.execute_script("return document.querySelector('script[src]')") is None
+
+
+@pytest.mark.slow
+def test_without_the_drawing_package_there_are_the_table_and_a_word(browser, tmp_path):
+    path = tmp_path / "page.html"
+    path.write_bytes(front_page(flights(3)).replace(b"'unsafe-eval' blob:;", b"'unsafe-eval';"))
+    browser.get(path.as_uri())
+    wait(browser, "byId('plot-note').textContent.includes('cannot be read')")
+    browser.execute_script("select(state.points[1].key)")
+    wait(browser, "byId('flights-note').textContent.includes('Point 1')")
+    assert browser.execute_script("return document.querySelectorAll('#table tbody tr').length") == 3
+    assert ["Content Security Policy" in one for one in errors(browser)] == [True]
 
 
 @pytest.mark.slow
@@ -169,3 +206,19 @@ def test_figures_that_were_never_seen_are_printed(browser, tmp_path):
     assert browser.execute_script(drawn) == 0
     browser.execute_cdp_cmd("Page.printToPDF", {})
     assert browser.execute_script(drawn) == browser.execute_script("return document.querySelectorAll('.panel-plot').length") > 0
+
+
+@pytest.mark.slow
+def test_a_figure_keeps_its_height_in_a_window_of_another_size(browser, tmp_path):
+    """The note below it is not covered."""
+    opened(browser, tmp_path, front_page(flights(3)))
+    heights = "return [byId('plot').clientHeight, document.querySelector('#plot .main-svg').getBoundingClientRect().height]"
+    width = "document.querySelector('#plot .main-svg').getBoundingClientRect().width"
+    (before, size), seen = browser.execute_script(heights), browser.execute_script(f"return {width}")
+    old = browser.get_window_size()
+    try:
+        browser.set_window_size(old["width"] - 100, old["height"])
+        wait(browser, f"{width} < {seen} - 10")
+        assert browser.execute_script(heights) == [before, size] == [440, 440]
+    finally:
+        browser.set_window_size(old["width"], old["height"])

@@ -22,7 +22,7 @@ from problems.compiled import Objective
 from runs import Study
 from runs.batch.store import Store
 from runs.browser import page as pages
-from runs.browser.curves import curves, rounded, thinned
+from runs.browser.curves import ORDER, curves, differences, thinned
 from runs.browser.front_page import front_page
 from runs.browser.points import samples_of
 from runs.browser.study_page import study_page
@@ -64,6 +64,18 @@ class Reader(HTMLParser):
         return json.loads(gzip.decompress(base64.b64decode(self.scripts[f"block-{name}"])))
 
 
+def values_of(told: list) -> np.ndarray:
+    """The values of a curve as a page has it; NaN in gaps."""
+    decimals, *steps = told
+    gaps = np.array([step is None for step in steps], dtype=bool)
+    whole = np.array([step for step in steps if step is not None], dtype=np.int64)
+    for _ in range(ORDER):
+        whole = np.cumsum(whole)
+    values = np.full(len(steps), np.nan)
+    values[~gaps] = whole / 10.0**decimals if decimals >= 0 else whole * 10.0**-decimals
+    return values
+
+
 def test_all_numbers_of_a_front_are_those_of_the_page_to_the_last_bit():
     front = marked(flights(5), [True, False, True, True, True])
     found = Reader(front_page(front)).data
@@ -83,10 +95,10 @@ def test_curves_are_the_trajectory():
         for phase in told["phases"]:
             flight = point.trajectory[phase["name"]]
             for one in phase["quantities"]:
-                times, values = np.array(phase["times"][one["t"]], dtype=float), np.array(one["v"], dtype=float)
+                times, values = values_of(phase["times"][one["t"]]), values_of(one["v"])
                 inside = np.clip(times, flight.t0, flight.tf)
                 if one["kind"] == "path":
-                    assert np.allclose(values, flight[one["name"]], rtol=1e-6)
+                    assert np.allclose(values, flight[one["name"]], rtol=1e-6) and one["unit"] == "km²/s³"
                     continue
                 exact = flight.at(inside)[one["name"]]
                 near = np.abs(values - exact) <= 1e-5 * np.ptp(exact)  # times are rounded, too
@@ -103,7 +115,7 @@ def test_costates_are_those_of_the_point_and_have_units():
     assert {name: one["unit"] for name, one in adjoint.items()} == units
     exact = {**point.costates["ascent"], "Hamiltonian": point.hamiltonian["ascent"]}
     for name, one in adjoint.items():
-        assert [one["v"][0], one["v"][-1]] == pytest.approx(exact[name][[0, -1]], rel=1e-5, abs=1e-9)
+        assert values_of(one["v"])[[0, -1]] == pytest.approx(exact[name][[0, -1]], rel=1e-5, abs=1e-9)
 
 
 @pytest.mark.parametrize("length", [-3.7e-6, 0.0, 2e-6])
@@ -138,6 +150,20 @@ def test_a_page_loads_nothing_and_stays_small():
     policy = next(attrs["content"] for _, attrs in reader.tags if attrs.get("http-equiv") == "Content-Security-Policy")
     assert "default-src 'none'" in policy and "connect-src 'none'" in policy
     assert front_page(flights(10)) == content  # the same bytes for the same front
+
+
+def test_the_drawing_package_comes_without_what_is_for_loaders_of_modules(monkeypatch):
+    from plotly.offline import get_plotlyjs
+
+    whole, told = get_plotlyjs(), pages.plotly().decode()
+    assert whole.index("self : this") < 1000 and "self : this" not in told[:1000]
+    assert "Licensed under the MIT license" in told[:200] and told.rstrip().endswith("window.Plotly = Plotly;")
+    assert 0 < len(whole) - len(told) < 500
+    # One that is wrapped otherwise is taken as it is.
+    pages.plotly.cache_clear()
+    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "window.Plotly = {};")
+    assert pages.plotly() == b"window.Plotly = {};"
+    pages.plotly.cache_clear()
 
 
 EVIL = "</script><script>alert(1)</script><!-- {{style}} %{x} $a$ & <b>"
@@ -178,9 +204,21 @@ def test_thinned_curves_keep_their_pulses():
 @given(st.lists(st.floats(-1e12, 1e12).map(lambda x: x if abs(x) > 1e-100 else 0.0), min_size=1, max_size=20))
 def test_rounded_values_differ_by_a_millionth_of_their_range(values):
     array = np.array(values)
-    found = np.array(rounded(array), dtype=float)
+    found = values_of(differences(array))
     assert np.abs(found - array).max() <= max(1e-6 * np.ptp(array), 1e-10 * np.abs(array).max()) * 1.001
-    assert rounded(np.array([1.0, np.nan])) == [1.0, None]
+
+
+def test_differences_pass_over_gaps():
+    assert differences(np.array([2.0, np.nan, 3.0, np.inf, 5.0])) == [6, 2000000, None, -3000000, None, 2000000]
+    assert differences(np.array([np.nan])) == [0, None] and differences(np.array([])) == [0]
+    assert values_of(differences(np.array([2e12, np.nan, 3e12]))).tolist() == pytest.approx([2e12, np.nan, 3e12], nan_ok=True)
+
+
+def test_curves_of_smooth_trajectories_take_a_third_of_the_room_of_their_values():
+    told = curves(flights(1)[0].trajectory, None, 400)
+    listed = [one["v"] for phase in told for one in phase["quantities"]]
+    plain = pages.packed([values_of(one).tolist() for one in listed])
+    assert len(pages.packed(listed)) < 0.4 * len(plain)
 
 
 def test_many_points_have_fewer_samples():

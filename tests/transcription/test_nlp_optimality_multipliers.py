@@ -255,3 +255,18 @@ def test_on_fronts_with_states_peaks_and_paths_they_leave_the_residual(make: Any
     assert solved.status == "converged"
     multipliers = check(nlp, solved.z, np.array([2.0, 3.0]))
     assert np.abs(multipliers.of_rows[nlp.g_lower < nlp.g_upper]).max() > 1e-2
+    check_alone(nlp, solved.z)
+
+
+def check_alone(nlp: NLP, z: np.ndarray) -> None:
+    """Those of one objective, from those of both, are the same as if the other had been left out from the beginning."""
+    both = Conditions.of(nlp, z, np.array([2.0, 3.0]))
+    assert both is not None
+    for sole in (np.array([True, False]), np.array([False, True])):
+        alone, other = both.alone(sole), Conditions.of(nlp, z, np.where(sole, [2.0, 3.0], np.inf))
+        assert other is not None and alone.residual == pytest.approx(other.residual, rel=1e-9, abs=1e-12)
+        assert alone.residual >= both.residual * (1 - 1e-9)
+        one, two = alone.multipliers(), other.multipliers()
+        assert one is not None and two is not None
+        for name in ("of_objectives", "of_rows", "of_bounds"):
+            np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=1e-7, atol=1e-9)

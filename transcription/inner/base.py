@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -79,12 +80,20 @@ class InnerSolver(ABC):
     **settings
         Those of each class.
 
+    Attributes
+    ----------
+    moves : bool
+        Whether candidates that are not feasible are moved to points nearby. If not, what is found for them says how they violate the
+        constraints.
+
     Examples
     --------
     >>> from transcription.inner import InnerSolver, inner_solver
     >>> isinstance(inner_solver("projection"), InnerSolver)
     True
     """
+
+    moves: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()

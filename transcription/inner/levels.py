@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -56,6 +57,8 @@ class Auto(Projection):
 class Propagate(InnerSolver):
     """Propagates the states from the free variables and changes nothing else; what constraints are left show in the violation."""
 
+    moves: ClassVar[bool] = False
+
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
         """See `InnerSolver.solve`."""
         start = started(nlp, candidates, warm)
@@ -68,6 +71,8 @@ class Propagate(InnerSolver):
 class Whole(InnerSolver):
     """No inner level: a candidate is the whole vector of the NLP, states and all, and is scored as it is. The dynamics are constraints like
     others, which the search itself has to satisfy, as population searches on collocation do in the literature."""
+
+    moves: ClassVar[bool] = False
 
     def program(self, nlp: NLP) -> NLP:
         """See `InnerSolver.program`."""

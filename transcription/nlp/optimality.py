@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg import lstsq
 from scipy.optimize import nnls
 from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack, identity, vstack
 from scipy.sparse.linalg import SuperLU, splu
@@ -156,6 +157,13 @@ class Conditions:
         except RuntimeError:
             return None
         return cls(linear, reduced, adjoints) if np.isfinite(reduced).all() and np.isfinite(adjoints).all() else None
+
+    def alone(self, sole: np.ndarray) -> Conditions:
+        """The conditions of the objectives of a mask (m,) alone, of those that are not left out already."""
+        linear, mine = self.linear, sole[np.isfinite(self.linear.scales)]
+        columns = np.concatenate([mine, np.ones(len(linear.slack), dtype=bool)])
+        linear = replace(linear, scales=np.where(sole, linear.scales, np.inf), of_objectives=linear.of_objectives[mine])
+        return Conditions(linear, self.reduced[:, columns], self.adjoints[:, columns])
 
     @cached_property
     def residual(self) -> float:
@@ -334,10 +342,12 @@ def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) ->
     full = np.vstack([M, np.r_[np.ones(m), np.zeros(k)]])
     right = np.r_[np.zeros(len(M)), 1.0]
     x = nnls(full, right, maxiter=10 * full.shape[1])[0]
-    # nnls solves normal equations, which lose half of the digits.
+    # nnls solves normal equations, which lose half of the digits. Orthogonal factors lose none, and truncate nothing where slacks are tiny,
+    # as singular values would.
     passive = x > 0
-    polished = np.zeros_like(x)
-    polished[passive] = np.linalg.lstsq(full[:, passive], right, rcond=None)[0]
+    polished, columns = np.zeros_like(x), full[:, passive]
+    rows = columns.any(axis=1)
+    polished[passive] = lstsq(columns[rows], right[rows], lapack_driver="gelsy", check_finite=False)[0]
     candidates = [x, np.maximum(polished, 0.0)]
     found = ((float(np.linalg.norm(M @ c) / c[:m].sum()), c / c[:m].sum()) for c in candidates if c[:m].sum() > 0)
     return min(found, key=lambda one: one[0])

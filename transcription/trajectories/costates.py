@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .trajectory import PiecewisePolynomial
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+
+NO_LENGTH = 1e-6
+"""Part of the whole duration that a phase lasts at most where it has no length."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,3 +77,10 @@ class Costates(Mapping[str, PhaseCostates]):
 
     def __len__(self) -> int:
         return len(self.phases)
+
+
+def has_length(trajectory: Trajectory, phase: PhaseTrajectory) -> bool:
+    """Whether a phase has a length. The multipliers of one without are no costates. If no phase has any, all count as if they had."""
+    lengths = [one.tf - one.t0 for one in trajectory.phases]
+    whole = max(one.tf for one in trajectory.phases) - min(one.t0 for one in trajectory.phases)
+    return phase.tf - phase.t0 > NO_LENGTH * whole or max(lengths) <= NO_LENGTH * whole

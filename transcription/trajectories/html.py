@@ -23,13 +23,13 @@ def trajectory_html(trajectory: Any) -> str:
 
 def _phase(phase: Any) -> str:
     """A title and a table of one `PhaseTrajectory`, at its nodes."""
-    units = {v.name: v.unit for v in (*phase.state_variables, *phase.control_variables)}
+    units = [v.unit for v in (*phase.state_variables, *phase.control_variables, *phase.path_limits)]
     kinds = [*(["state"] * phase.states.shape[1]), *(["control"] * phase.controls.shape[1]), *(["path"] * phase.paths.shape[1])]
     heads = ("", "kind", "unit", "first", "last", "least", "most", "over time")
     rows = [_cells(heads, "th")]
-    for name, kind, values in zip(phase.names, kinds, np.hstack([phase.states, phase.controls, phase.paths]).T, strict=True):
+    for name, kind, unit, values in zip(phase.names, kinds, units, np.hstack([phase.states, phase.controls, phase.paths]).T, strict=True):
         numbers = [f"{value + 0.0:.6g}" for value in (values[0], values[-1], values.min(), values.max())]
-        cells = _cells((name, kind, units.get(name, ""), *numbers), "td")
+        cells = _cells((name, kind, unit, *numbers), "td")
         rows.append(f"{cells}<td>{_line(phase.time, values)}</td>")
     table = "".join(f"<tr>{row}</tr>" for row in rows)
     title = f"{escape(phase.name)}: {phase.t0:.6g} to {phase.tf:.6g} {escape(phase.time_unit)}, {len(phase.time)} nodes"

@@ -238,11 +238,17 @@ def worst_violation(problem: CompiledProblem, simulation: Simulation) -> tuple[s
 
 
 @remembered
+def limits_by_label(problem: CompiledProblem) -> dict[str, Variable | Limit]:
+    """What is limited in a problem, but for times and links, by its label in `Simulation.violations`."""
+    limits = {label: limit for phase in problem.phases for label, limit in _labelled(phase) if label}
+    return limits | {f"constraint '{limit.name}'": limit for limit in problem.limits}
+
+
+@remembered
 def _stricter(problem: CompiledProblem) -> dict[str, float]:
     """The scale of each constraint as a part of its `verified_scale`, by its label in `Simulation.violations`, where they differ."""
-    limits = [one for phase in problem.phases for one in _labelled(phase) if one[0]]
-    limits += [(f"constraint '{limit.name}'", limit) for limit in problem.limits]
-    return {label: part for label, limit in limits if (part := limit.scale / verified_scale(limit)) < 1.0}
+    parts = {label: limit.scale / verified_scale(limit) for label, limit in limits_by_label(problem).items()}
+    return {label: part for label, part in parts.items() if part < 1.0}
 
 
 def _start(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from problems.compiled import Limit, Variable
+from transcription.trajectories.costates import has_length
 
 from .limits import draw_limits
 from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, per, plain, wrapped
@@ -28,10 +29,6 @@ LEAST = 1e-3
 
 FLAT = 0.02
 """Least range in which costates and the Hamiltonian are drawn, as a part of what all costates are worth: less is round-off."""
-
-
-NO_LENGTH = 1e-6
-"""Part of the whole duration that a phase lasts at most where it has no length."""
 
 
 NODES = 60
@@ -169,13 +166,6 @@ def _range_of(phase: PhaseTrajectory, name: str) -> np.ndarray:
     return values if np.ptp(values) >= least else np.array([0.0, least])
 
 
-def has_length(trajectory: Trajectory, phase: PhaseTrajectory) -> bool:
-    """Whether a phase has a length. The multipliers of one without are no costates. If no phase has any, all count as if they had."""
-    lengths = [one.tf - one.t0 for one in trajectory.phases]
-    whole = max(one.tf for one in trajectory.phases) - min(one.t0 for one in trajectory.phases)
-    return phase.tf - phase.t0 > NO_LENGTH * whole or max(lengths) <= NO_LENGTH * whole
-
-
 def costate_ranges(trajectory: Trajectory, costates: Costates) -> dict[str | None, float]:
     """The least range in which the costate of each state is drawn, and the Hamiltonian (None): less is round-off."""
     phases = [phase for phase in trajectory.phases if has_length(trajectory, phase)]
@@ -251,7 +241,7 @@ def draw_panel(ax: Any, drawn: Sequence[Drawn], name: str, kind: str) -> None:
         ((min(phase.t0 for phase in phases), max(phase.tf for phase in phases)), lower, upper) for (lower, upper), phases in held.items()
     ]
     draw_limits(ax, np.concatenate(values), limits)
-    ax.set_ylabel(_beside(name, getattr(owners[0], "unit", "")))
+    ax.set_ylabel(_beside(name, owners[0].unit))
     ax.set_title("; ".join(dict.fromkeys(_range(owner) for owner in owners)), loc="right", fontsize=7, color=GREY, pad=2)
 
 

@@ -95,7 +95,7 @@ def problem(
     most = 1e-3 * float(allowed_load(limit))
     problem = Problem("aerocapture_bank")
     ends, load = flight(problem, lift, drag, nose, most=2.0 * most, declination=declination, bank_rate=bank_rate)
-    problem.constraint("heat shield", load, upper=most, scale=most)
+    problem.constraint("heat shield", load, upper=most, unit="kJ/cm2", scale=most)
     problem.minimize("delta v", circularisation(ends["speed"]), unit="m/s")
     problem.minimize("TPS mass fraction", shield_fraction(1e3 * load), unit="%")
     guess(problem, planar, nose, most, declination)
@@ -163,7 +163,8 @@ def flight(
     begins, ends = ({name: of(symbol) for name, symbol in states.items()} for of in (phase.initial, phase.final))
     for name, expression in arrival(begins, declination, MARS).items():
         problem.constraint(name, expression, lower=0.0, upper=0.0)
-    problem.constraint("apoapsis", apoapsis(ends, MARS) / 1e3, lower=MARS.target / 1e3, upper=MARS.target / 1e3, scale=100.0)
+    target = MARS.target / 1e3
+    problem.constraint("apoapsis", apoapsis(ends, MARS) / 1e3, lower=target, upper=target, unit="km", scale=100.0)
     return ends, phase.final(heat)
 
 

@@ -70,6 +70,9 @@ class Limits:
     load_factor: float
 
 
+LIMIT_UNITS = {"heating_rate": "Btu/ft2/s", "dynamic_pressure": "lbf/ft2", "load_factor": "g"}
+
+
 @dataclass(frozen=True)
 class Zone:
     """A circle on the map, all in degrees, over which no flight may go."""
@@ -145,16 +148,17 @@ def reentry(
     load = SHUTTLE.load_factor(altitude, speed, attack, mass, gravity)
     limited = heating, SHUTTLE.dynamic_pressure(altitude, speed) / PRESSURE, load
     for (word, limit), value in zip(vars(limits).items(), limited, strict=True):
-        phase.path(word.replace("_", " "), value, upper=limit, scale=limit)
+        phase.path(word.replace("_", " "), value, upper=limit, unit=LIMIT_UNITS[word], scale=limit)
     for number, zone in enumerate(zones, 1):
         east, north = (degrees(1.0) * phase[word] - getattr(zone, word) for word in ("longitude", "latitude"))
-        phase.path(f"distance from zone {number}", ca.sqrt(east**2 + north**2), lower=zone.radius, scale=zone.radius)
+        phase.path(f"distance from zone {number}", ca.sqrt(east**2 + north**2), lower=zone.radius, unit="deg", scale=zone.radius)
 
     for state, tolerance in given.items():
         if tolerance > 0:
             # Eq. (10): rows of their own, as what counts as one at the end is what is left open there.
             error = phase.final(states[state]) - END[state]
-            problem.constraint(f"final {state}", error, lower=-tolerance, upper=tolerance, scale=tolerance)
+            unit = UNITS.get(state, "rad")
+            problem.constraint(f"final {state}", error, lower=-tolerance, upper=tolerance, unit=unit, scale=tolerance)
 
     problem.maximize("cross-range", degrees(1.0) * phase.final(phase["latitude"]), unit="deg")
     problem.minimize("heat load", 1e-3 * phase.integral(heating), unit="kBtu/ft2")

@@ -59,7 +59,7 @@ class Mission:
     lowest : float
         Altitude at which the descent ends, m.
     heating : float
-        Limit of the heating rate, in the unit of the vehicle's.
+        Limit of the heating rate, Btu/ft2/s, as the vehicle's.
     impulse : float
         Specific impulse, s; the flow of propellant is that of the local gravity, as both papers have it.
     lags : mapping
@@ -138,7 +138,7 @@ def _fly(phase: Phase, mission: Mission, begins: Mapping[str, float], ends: Mapp
     rates |= {name: gain * (commands[name] - states[name]) for name, gain in mission.lags.items()}
     phase.dynamics(**rates)
     heating = vehicle.heating_rate(altitude, speed, attack)
-    phase.path("heating rate", heating, upper=mission.heating, scale=mission.heating)
-    phase.path("dynamic pressure", vehicle.dynamic_pressure(altitude, speed), upper=PRESSURE, scale=PRESSURE)
-    phase.path("load factor", vehicle.load_factor(altitude, speed, attack, mass), upper=LOAD, scale=LOAD)
+    phase.path("heating rate", heating, upper=mission.heating, unit="Btu/ft2/s", scale=mission.heating)
+    phase.path("dynamic pressure", vehicle.dynamic_pressure(altitude, speed), upper=PRESSURE, unit="Pa", scale=PRESSURE)
+    phase.path("load factor", vehicle.load_factor(altitude, speed, attack, mass), upper=LOAD, unit="g", scale=LOAD)
     return heating

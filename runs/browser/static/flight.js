@@ -112,8 +112,8 @@ function panelFigure(flights, { name, kind, unit }) {
       least = Math.max(least, own.least);
       limits.push({ phase, lower: own.lower, upper: own.upper });
       traces.push({
-        x: phase.times[own.t],
-        y: own.v,
+        x: curveValues(phase.times[own.t]),
+        y: curveValues(own.v),
         mode: "lines",
         line: { color: colorOf(k), width: WIDTHS[k], dash: k % 2 ? "dash" : "solid" },
         name: plotText(pointName(point)),
@@ -159,6 +159,19 @@ function panelFigure(flights, { name, kind, unit }) {
       yaxis: axis("", { range: [low - margin, high + margin], nticks: 5 }),
     }),
   };
+}
+
+/** The values of a curve from the number of its decimals and its third differences; null in gaps. */
+function curveValues([decimals, ...differences]) {
+  const unit = Number(`1e${Math.abs(decimals)}`);
+  let value = 0, slope = 0, bend = 0;
+  return differences.map((step) => {
+    if (step === null) return null;
+    bend += step;
+    slope += bend;
+    value += slope;
+    return decimals < 0 ? value * unit : value / unit;
+  });
 }
 
 const endOfPhase = (time) => ({

@@ -33,7 +33,7 @@ const layout = (more = {}) => ({
   separators: ".", // of decimals; none of thousands
   paper_bgcolor: "#fff",
   plot_bgcolor: "#fff",
-  margin: { l: 60, r: 34, t: 30, b: 50 },
+  margin: { l: 60, r: 34, t: 30, b: 52 }, // as much as labels need: where margins must grow, a figure is drawn twice
   modebar: { orientation: "v" }, // beside the figure, not above its legend
   hovermode: "closest",
   hoverlabel: { bgcolor: "#fff", bordercolor: INK, font: FONT, align: "left" },
@@ -93,8 +93,9 @@ function forget(place) {
   watcher.unobserve(place);
 }
 
-/** Draw a figure now. */
+/** Draw a figure now. Its place has its height: where the window changes, the package takes the height from there. */
 function draw(place, traces, figure, config = CONFIG) {
+  place.style.height = `${figure.height}px`;
   pending.set(place, Plotly.react(place, traces, figure, config));
 }
 

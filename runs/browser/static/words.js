@@ -40,7 +40,7 @@ function column(values) {
 }
 
 const withUnit = (name, unit) => (unit ? `${name} [${unit}]` : name);
-const grouped = (count) => count.toLocaleString("en").replace(/,/g, "\u202f");
+const grouped = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, "\u202f");
 const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 
 /** The limits of a quantity in words. */

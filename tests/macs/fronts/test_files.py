@@ -7,6 +7,7 @@ import io
 import json
 import os
 import pickle
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from macs.io.atomic import sealed, unsealed
 from macs.io.labelled import legal_names
 from problems.compiled import Variable
 from transcription import DFET
+from transcription.trajectories.trajectory import Trajectory
 
 
 def same(a, b) -> bool:
@@ -145,7 +147,18 @@ def test_the_file_is_self_describing(tmp_path):
     assert json.loads(root.attrs["versions"])["numpy"] == np.__version__
     climb = xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf", group="climb")
     assert climb["h"].dims == climb["u"].dims == climb["load"].dims == ("point", "node") and climb["h"].shape == climb["time"].shape
-    assert {name: climb[name].attrs["units"] for name in ("time", "h", "v", "u")} == {"time": "s", "h": "km", "v": "km/s", "u": "km/s²"}
+    load = {"load": "km²/s³"}
+    assert (
+        climb["path_unit"].values.tolist() == [load["load"]]
+        and Front.load(tmp_path / "front.nc")[0].trajectory["climb"].path_limits[0].unit
+    )
+    assert {name: climb[name].attrs["units"] for name in ("time", "h", "v", "u", "load")} == {
+        "time": "s",
+        "h": "km",
+        "v": "km/s",
+        "u": "km/s²",
+        **load,
+    }
     assert climb["state_coefficients"].sel(state="v").dims == ("point", "element", "state_function")
 
 
@@ -449,10 +462,31 @@ def test_older_formats_are_read_with_a_warning(tmp_path, version):
     with pytest.warns(UserWarning, match=rf"front\.nc was written by an earlier MACS \(format {version}\) and has no checksum") as caught:
         old = Front.load(path)
     assert [Path(one.filename).name for one in caught] == ["test_files.py"]
-    new = flights(2, elements=[1, 2])
-    assert_same(old, new.replace(stats=new.stats | {"versions": old.stats["versions"]}))
+    assert_same(old, before_limits_had_units(old))
     old.save(path)
     assert_same(Front.load(path), old)
+
+
+def before_limits_had_units(saved: Front) -> Front:
+    """What the files in the folder `files` have."""
+    new = flights(2, elements=[1, 2])
+    phases = [
+        [replace(one, path_limits=tuple(replace(limit, unit="") for limit in one.path_limits)) for one in flight.phases]
+        for flight in new.trajectories
+    ]
+    bare = [Trajectory(tuple(several), flight.parameters) for several, flight in zip(phases, new.trajectories, strict=True)]
+    return new.replace(trajectories=bare, stats=new.stats | {"versions": saved.stats["versions"]})
+
+
+def test_files_from_before_limits_had_units_are_read(tmp_path):
+    """They are of today's format but for that, and their fronts are still those of the same problem, whose limits have units now."""
+    path = tmp_path / "front.nc"
+    path.write_bytes(gzip.decompress((Path(__file__).parent / "files" / "format3.nc.gz").read_bytes()))
+    old = Front.load(path, problem=compiled())
+    assert_same(old, before_limits_had_units(old))
+    assert len(Front.merge([old, flights(3, 1)])) == 5
+    content = files.to_bytes(old)
+    assert_same(files.from_bytes(content), old)
 
 
 def test_an_older_format_is_not_believed_with_a_checksum_nor_this_one_without(tmp_path):
@@ -798,7 +832,7 @@ def test_csv_of_a_trajectory_is_its_history(tmp_path):
     point = flights(3)[1]
     point.to_csv(tmp_path / "flight.csv")
     head, rows = table(tmp_path / "flight.csv")
-    assert head == ["phase", "time [s]", "h [km]", "v [km/s]", "u [km/s²]", "load"]
+    assert head == ["phase", "time [s]", "h [km]", "v [km/s]", "u [km/s²]", "load [km²/s³]"]
     climb, coast = point.trajectory.phases
     count = len(climb.time)
     assert [row[0] for row in rows] == ["climb"] * count + ["coast"] * len(coast.time)

@@ -151,7 +151,7 @@ def test_given_axes_are_used_and_style_does_not_leak():
 def test_a_point_is_drawn_with_all_it_has():
     point = flights()[1]
     axes = point.plot()
-    assert [ax.get_ylabel() for ax in axes] == ["h [km]", "v [km/s]", "u [km/s²]", "load"]
+    assert [ax.get_ylabel() for ax in axes] == ["h [km]", "v [km/s]", "u [km/s²]", "load [km²/s³]"]
     draw(axes[0].figure)
     figure = blank_figure()
     assert point.plot(figure)[0].figure is figure

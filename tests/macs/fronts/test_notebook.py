@@ -51,6 +51,16 @@ def test_a_front_is_its_table_and_a_picture():
     assert picture(page).std() > 0.01, "not blank"
 
 
+def test_a_trajectory_names_all_units():
+    rows = cells(shown(flights(1)[0].trajectory))
+    assert [row[:3] for row in rows[1:5]] == [
+        ["h", "state", "km"],
+        ["v", "state", "km/s"],
+        ["u", "control", "km/s²"],
+        ["load", "path", "km²/s³"],
+    ]
+
+
 @pytest.mark.parametrize(
     "front",
     [empty(), empty(closest=None), black_box(0, 2), black_box(0, 5), black_box(1, 1), black_box(9, 4), flights(3, status=["failed"] * 3)],

@@ -13,7 +13,7 @@ from macs.fronts.pictures.style import COLORS
 def test_a_color_for_each_trajectory_in_every_panel():
     front = flights(5)
     axes = front.plot_trajectories([0, 4])
-    assert [ax.get_ylabel() for ax in axes] == ["h [km]", "v [km/s]", "u [km/s²]", "load"]
+    assert [ax.get_ylabel() for ax in axes] == ["h [km]", "v [km/s]", "u [km/s²]", "load [km²/s³]"]
     for ax in axes:
         assert {to_hex(line.get_color()).upper() for line in ax.lines if line.get_linestyle() == "-"} == set(COLORS[:2])
     figure = axes[0].figure

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from macs.pareto.archive import Archive, insert, least_violated
+from macs.pareto.archive import Archive, insert, least_violated, outside
 from macs.pareto.dominance import dominates, extremes
 from macs.pareto.energy import pair_energies, reach, spread
 
@@ -184,6 +184,26 @@ def test_the_least_violated_point_is_the_first_of_those_that_violate_least():
     offered = np.array([[2.0], [3.0], [4.0]]), np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])
     assert least_violated(closest, *offered, np.array([0.4, 0.2, 0.2])).Z.tolist() == [[3.0]]
     assert least_violated(closest, *offered, np.array([0.4, 0.3, 0.5])).Z.tolist() == [[1.0]]
+
+
+def test_points_outside_are_infeasible_and_neither_dominated_by_the_archive_nor_among_themselves():
+    archive = Archive(np.array([[0.0]]), np.array([[2.0, 2.0]]), np.zeros(1))
+    known = Archive(np.array([[1.0], [2.0]]), np.array([[1.0, 3.0], [0.5, 5.0]]), np.array([0.1, 9.0]))
+    Z = np.array([[3.0], [4.0], [5.0], [6.0], [7.0]])
+    F = np.array([[0.9, 2.9], [3.0, 3.0], [1.5, 1.5], [0.0, 0.0], [0.0, np.nan]])
+    found = outside(known, archive, Z, F, np.array([0.5, 0.1, 0.2, 0.0, 0.5]), limit=5, tolerance=1e-6)
+    assert found.Z.tolist() == [[2.0], [3.0], [5.0]]
+    assert outside(known, archive, Z, F, np.array([np.inf] * 5), limit=5, tolerance=1e-6).Z.tolist() == [[1.0], [2.0]]
+    assert len(outside(known, archive, Z, F, np.array([0.5, 0.1, 0.2, 0.0, 0.5]), limit=2, tolerance=1e-6)) == 2
+
+
+def test_the_least_violated_points_differ_and_only_the_first_may_have_failed():
+    closest = Archive(np.array([[1.0]]), np.array([[5.0, 5.0]]), np.array([0.3]))
+    Z, F = np.array([[2.0], [1.0], [4.0]]), np.array([[0.0, 0.0], [5.0, 5.0], [2.0, 2.0]])
+    assert least_violated(closest, Z, F, np.array([0.4, 0.3, 0.2]), 5).Z.tolist() == [[4.0], [1.0], [2.0]]
+    assert least_violated(closest, Z, F, np.array([0.4, 0.3, 0.2]), 2).Z.tolist() == [[4.0], [1.0]]
+    assert least_violated(closest, Z, F, np.array([np.inf, 0.3, np.inf]), 5).Z.tolist() == [[1.0]]
+    assert least_violated(closest.take([]), Z, F, np.full(3, np.inf), 5).Z.tolist() == [[2.0]]
 
 
 def test_what_an_archive_keeps_has_less_energy_by_the_exponent_that_is_given():

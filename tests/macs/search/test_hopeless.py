@@ -20,7 +20,7 @@ def ride(low: float) -> Problem:
     x, v = walk.state("x", bounds=(-10, 10), initial=0), walk.state("v", bounds=(-5, 5), initial=0, final=-1)
     u = walk.control("u", bounds=(-5, 5))
     walk.dynamics(x=v, v=u)
-    walk.path("sum", x + v, upper=low)
+    walk.path("sum", x + v, upper=low, unit="m")
     walk.path("place", x, lower=-2.0)
     problem.minimize("time", walk.tf)
     problem.minimize("effort", walk.integral(u**2))
@@ -35,7 +35,7 @@ def test_a_search_ends_where_solves_for_feasibility_find_nothing(tmp_path, inner
     assert len(front) == 0 and front.stats["stopped"] == "settled" and least <= front.stats["evaluations"] < most
     assert (
         "solves for feasibility from different starts find none nearby" in front.message
-        and "violates path 'sum' of 'walk' by 0.5 of its scale" in front.message
+        and "violates path 'sum' of 'walk' by 0.5 of its scale, 1 m" in front.message
     )
     assert front.closest.violations["path 'sum' of 'walk'"] == pytest.approx(0.5, abs=1e-3)
     again = MACS(agents=5, archive=5).solve(ride(-0.5), DFET(3, 3), **terms)

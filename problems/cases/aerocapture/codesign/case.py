@@ -75,10 +75,10 @@ def problem(
     capsule = sized(ratios[0], ratios[1], front, rear)
     lift, drag = lift_and_drag(capsule, attack)
     size = problem.parameter(SIZE, bounds=SIZES, unit="m")
-    problem.constraint("diameter", size - 2.0 * capsule.base, lower=0.0)
-    problem.constraint("whole length", size - capsule.length, lower=0.0)
+    problem.constraint("diameter", size - 2.0 * capsule.base, lower=0.0, unit="m")
+    problem.constraint("whole length", size - capsule.length, lower=0.0, unit="m")
     problem.constraint("lift over drag", lift / drag, lower=LIFT_TO_DRAG)
-    problem.constraint("length", capsule.length, lower=LENGTH)
+    problem.constraint("length", capsule.length, lower=LENGTH, unit="m")
     limits = {"most": LOAD, "declination": declination, "bank_rate": bank_rate, "steepest": steepest}
     ends, load = flight(problem, lift * capsule.area, drag * capsule.area, capsule.nose, **limits)
     problem.minimize(PACKING, size / VOLUME, unit="1/m2")
@@ -86,7 +86,7 @@ def problem(
     problem.minimize(DELTA_V, circularisation(ends["speed"]), unit="m/s")
     if corridor:
         ballistic = ballistic_coefficient(capsule, drag)
-        problem.constraint("ballistic coefficient", ballistic, lower=BALLISTIC[0], upper=BALLISTIC[1])
+        problem.constraint("ballistic coefficient", ballistic, lower=BALLISTIC[0], upper=BALLISTIC[1], unit="kg/m2")
         problem.maximize(CORRIDOR, width(ballistic, lift / drag), unit="deg")
     design = np.array([TABLE_2[shape or STATED].design])
     design[:, -1] *= np.sign(judged(design).lift_to_drag)

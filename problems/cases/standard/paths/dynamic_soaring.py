@@ -43,9 +43,9 @@ def problem() -> Problem:
             "heading": (share * lift * ca.sin(bank) - gust * ca.cos(heading)) / (v * ca.cos(path)),
         }
     )
-    circle.path("load factor", share * lift / GRAVITY, lower=-2.0, upper=LOAD)
-    for name, value, turn in (("v", v, 0.0), ("path angle", path, 0.0), ("heading", heading, 2 * pi)):
-        problem.constraint(f"closed {name}", circle.final(value) - circle.initial(value), lower=turn, upper=turn)
+    circle.path("load factor", share * lift / GRAVITY, lower=-2.0, upper=LOAD, unit="g")
+    for name, value, turn, unit in (("v", v, 0.0, "ft/s"), ("path angle", path, 0.0, "rad"), ("heading", heading, 2 * pi, "rad")):
+        problem.constraint(f"closed {name}", circle.final(value) - circle.initial(value), lower=turn, upper=turn, unit=unit)
     problem.minimize("gradient", gradient, unit="1/s")
     problem.guess(gradient=0.08)
     t = np.linspace(0.0, 24.0, 50)

@@ -47,7 +47,7 @@ def problem() -> Problem:
         }
     )
     surface = DENSITY * exp(REFERENCE / SCALE_HEIGHT)
-    flight.path("heating", 17600 * ca.sqrt(density / surface) * (v / sqrt(MU / EARTH)) ** 3.15, upper=HEATING)
+    flight.path("heating", 17600 * ca.sqrt(density / surface) * (v / sqrt(MU / EARTH)) ** 3.15, upper=HEATING, unit="Btu/ft2/s")
     turned = ca.cos(flight.final(latitude)) * ca.cos(flight.final(heading))
     problem.constraint("turn", turned, lower=cos(TURN), upper=cos(TURN))
     problem.maximize("speed", flight.final(v), unit="ft/s")

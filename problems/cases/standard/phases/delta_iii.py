@@ -52,7 +52,8 @@ def problem() -> Problem:
     last = phases[-1]
     last.guess(tf=TIMES[-1] - 50.0)
     for name, value in _elements([last[axis] for axis in AXES], [last[f"v{axis}"] for axis in AXES]).items():
-        problem.constraint(name, last.final(value), lower=ORBIT[name], upper=ORBIT[name], scale=EARTH if name == "size" else 1.0)
+        unit, scale = {"size": ("m", EARTH), "eccentricity": ("", 1.0)}.get(name, ("rad", 1.0))
+        problem.constraint(name, last.final(value), lower=ORBIT[name], upper=ORBIT[name], unit=unit, scale=scale)
     problem.maximize("mass", last.final(last["m"]), unit="kg")
     return problem
 

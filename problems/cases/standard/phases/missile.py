@@ -49,4 +49,4 @@ def _state(phase: Phase, lowest: float, initial: dict[str, float], final: dict[s
             "h": v * ca.sin(path),
         }
     )
-    phase.path("load", lift / (MASS * GRAVITY), lower=-4.0, upper=4.0)
+    phase.path("load", lift / (MASS * GRAVITY), lower=-4.0, upper=4.0, unit="g")
