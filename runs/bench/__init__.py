@@ -2,7 +2,7 @@
 meshes by a density in `density`; transcriptions in `methods`; populations simulated in one call in `population`; searches in `search`,
 batches of them in `study`; published optima in `standard`; one optimum beside other programs in `peers`."""
 
-from .command import KINDS, bench
+from .command import KINDS, SEEDED, bench
 from .page import header_of, sources
 
-__all__ = ["KINDS", "bench", "header_of", "sources"]
+__all__ = ["KINDS", "SEEDED", "bench", "header_of", "sources"]

@@ -32,20 +32,23 @@ BENCHMARKS: dict[str, Any] = {
 }
 KINDS = tuple(sorted(BENCHMARKS))
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
+SEEDED = (*functions.NAMES, "prefer", "search")
+"""Benchmarks that are repeated with other seeds."""
 
 
-def bench(kinds: Sequence[str], quick: bool, path: str | None, page: str | None = None) -> bool:
-    """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one.
+def bench(kinds: Sequence[str], quick: bool, path: str | None, page: str | None = None, seeds: int | None = None) -> bool:
+    """Run some of `KINDS`, one after the other, those of `SEEDED` with the seeds 1 to `seeds` if that is given; write all numbers to the
+    CSV file `path`, if there is one.
 
     The report of a single one is also written to `page`, if there is one and it was not interrupted. Returns whether all targets are met,
     see `Target`.
     """
-    header = header_of(kinds[0], quick, page) if page else None
+    header = header_of(kinds[0], quick, page, seeds) if page else None
     measured: list[tuple[str, Row]] = []
     missed: list[str] = []
     for kind in kinds:
         rows: list[Row] = []
-        ended = _run(kind, rows, quick)
+        ended = _run(kind, rows, quick, seeds)
         measured += [(kind, row) for row in rows]
         if rows:
             text = BENCHMARKS[kind].report(rows)
@@ -65,12 +68,14 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None, page: str | None 
     return not missed
 
 
-def _run(kind: str, rows: list[Row], quick: bool) -> bool:
+def _run(kind: str, rows: list[Row], quick: bool, count: int | None = None) -> bool:
     """Measure; returns whether Ctrl-C was pressed."""
+    seeds = tuple(range(1, count + 1)) if count else QUICK_SEEDS if quick else SEEDS
     cases = [case for case in inner.INNER if case.quick or not quick]
     sets = {name: BENCHMARKS[name] for name in functions.NAMES}
+    drawn = seeds if count else functions.SEEDS
     work: dict[str, Callable[[], None]] = {
-        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows)) for name, one in sets.items()},
+        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows, drawn)) for name, one in sets.items()},
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "front": lambda: fronts.bench_fronts(rows, fronts.QUICK if quick else fronts.Effort()),
         "generation": lambda: generation.bench_generation(rows, generation.QUICK if quick else generation.FULL),
@@ -79,9 +84,9 @@ def _run(kind: str, rows: list[Row], quick: bool) -> bool:
         "passages": lambda: passages.bench_passages(rows, passages.QUICK if quick else passages.Effort()),
         "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),
         "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
-        "prefer": lambda: prefer.bench_prefer(rows, QUICK_SEEDS if quick else SEEDS, quick),
+        "prefer": lambda: prefer.bench_prefer(rows, seeds, quick),
         "scale": lambda: scale.bench_scale(rows, scale.QUICK if quick else scale.FULL),
-        "search": lambda: search.bench_search(rows, QUICK_SEEDS if quick else SEEDS, quick),
+        "search": lambda: search.bench_search(rows, seeds, quick),
         "standard": lambda: standard.bench_standard(rows, standard.Effort(standard.QUICK) if quick else standard.Effort()),
         "study": lambda: study.bench_study(rows, study.QUICK if quick else study.Effort()),
     }

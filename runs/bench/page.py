@@ -32,9 +32,11 @@ def sources(kind: str) -> list[Path]:
     return files + [Path(__file__).with_name(f"{name}.py") for name in SHARED]
 
 
-def header_of(kind: str, quick: bool, path: str | PathLike[str]) -> PageHeader:
+def header_of(kind: str, quick: bool, path: str | PathLike[str], seeds: int | None = None) -> PageHeader:
     """The header of the page of a benchmark at a path. Raises ValueError if it cannot be written into a comment."""
-    command = shlex.join(["macs", "bench", kind, *(["--quick"] if quick else []), "--page", str(path)])
+    command = shlex.join(
+        ["macs", "bench", kind, *(["--quick"] if quick else []), *(["--seeds", str(seeds)] if seeds else []), "--page", str(path)]
+    )
     return PageHeader.now(command, sources(kind))
 
 

@@ -162,13 +162,18 @@ def bench(arguments: Namespace) -> int:
     kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
     if arguments.csv:
         check_target(arguments.csv)
+    if arguments.seeds:
+        if arguments.quick:
+            raise WrongCall("--seeds: --quick has one seed")
+        if arguments.what and kinds[0] not in benchmarks.SEEDED:
+            raise WrongCall(f"--seeds: '{kinds[0]}' has none; those with seeds are {', '.join(sorted(benchmarks.SEEDED))}")
     if arguments.page:
         if not arguments.what:
             raise WrongCall("--page: of which one? a page is of a single benchmark")
         check_target(arguments.page)
         with wrong_call_on_value_error():
-            benchmarks.header_of(kinds[0], arguments.quick, arguments.page)
-    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv, arguments.page) else FAILED
+            benchmarks.header_of(kinds[0], arguments.quick, arguments.page, arguments.seeds)
+    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv, arguments.page, arguments.seeds) else FAILED
 
 
 # Arguments

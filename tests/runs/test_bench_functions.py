@@ -7,7 +7,7 @@ import pytest
 from plain import dtlz, uf
 
 from macs.pareto.dominance import nondominated
-from runs.bench import command
+from runs.bench import command, header_of
 from runs.bench.functions import NAMES, Contest, cases, contest, judged
 from runs.bench.functions.uf import UF
 from runs.bench.measured import Row
@@ -137,7 +137,7 @@ def test_the_best_median_is_asked_on_a_share(name, key, least, monkeypatch, caps
             for row in rows_of(one.name, key, one.evaluations, MACS=[0.0, better if i < good else 1 / better, 9.0], NSGA_II=[1.0])
         ]
         assert [one.met for one in judged.TARGETS[name](rows)] == [good == least]
-        monkeypatch.setattr(command, "_run", lambda one, found, quick, rows=rows: found.extend(rows) or False)
+        monkeypatch.setattr(command, "_run", lambda one, found, quick, seeds, rows=rows: found.extend(rows) or False)
         assert main(["bench", name]) == (0 if good == least else 1)
         assert f"{good} of {len(functions)}" in capsys.readouterr().out
     assert judged.TARGETS[name](rows[2:]) == [], "not all were measured"
@@ -183,3 +183,15 @@ def test_p_values_are_corrected_for_all_rivals():
 
 def test_all_sets_are_kinds():
     assert set(NAMES) <= set(command.KINDS)
+
+
+def test_so_many_seeds_as_are_asked_for(monkeypatch, tmp_path, capsys):
+    asked = []
+    monkeypatch.setattr(Contest, "bench", lambda self, rows, seeds, *rest: asked.append((self.name, tuple(seeds))))
+    page = tmp_path / "zdt.md"
+    assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--page", str(page)]) == 0
+    assert asked == [("zdt", tuple(range(1, 11))), ("zdt", (1, 2, 3))]
+    assert "--seeds 3 " in header_of("zdt", False, page, 3).command
+    for call, words in ((["inner", "--seeds", "2"], "'inner' has none"), (["zdt", "--quick", "--seeds", "2"], "--quick has one seed")):
+        assert main(["bench", *call]) == 2
+        assert words in capsys.readouterr().err

@@ -1,6 +1,6 @@
 """Benchmarks of searches on plain functions: many objectives, CEC 2009, ZDT and constraints, against the other algorithms."""
 
 from .cases import NAMES
-from .contest import Contest
+from .contest import SEEDS, Contest
 
-__all__ = ["NAMES", "Contest"]
+__all__ = ["NAMES", "SEEDS", "Contest"]
