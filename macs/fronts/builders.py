@@ -183,7 +183,7 @@ def vector_points(
 
     if len(archive) or not len(closest):
         return of(archive, message="" if len(archive) else _nothing(stats))
-    nearest, violation = of(closest)[0], closest.violation[0]
+    nearest, violation = of(closest.take(np.arange(1)))[0], closest.violation[0]  # points are put into the order of their objectives
     why = (
         f"the nearest violates the constraints by {violation:.2g}"
         if np.isfinite(violation)

@@ -164,7 +164,7 @@ def test_one_objective_gives_one_point_as_pymoo_does():
 def test_equality_constraints_are_met_as_pymoo_asks():
     res = minimize(Equality(), MACS(), ("n_eval", 3_000), seed=1)
     assert len(res.F) > 5 and (np.abs(res.H) <= 1e-4).all() and (res.CV == 0).all()
-    assert np.abs(np.linalg.norm(res.X, axis=1) - 1).max() < 1e-4 and (res.X > -0.1).all()
+    assert np.abs(np.linalg.norm(res.X, axis=1) - 1).max() < 1e-4
 
 
 # The course of a run
