@@ -90,8 +90,8 @@ def test_points_of_a_search_have_them():
     assert sum(point.costates is not None for point in front) >= 4
 
 
-def refined(name: str):
-    return Front.of(optimize(load(f"standard/{name}"), starts=1).alone()).refine_mesh()[0]
+def refined(name: str, **options):
+    return Front.of(optimize(load(f"standard/{name}"), **options).alone()).refine_mesh()[0]
 
 
 @pytest.mark.parametrize(
@@ -109,14 +109,14 @@ def refined(name: str):
 def test_the_hamiltonian_is_constant_where_nothing_depends_on_time(name, value):
     """Minus the slope of the objective in the free final time: 1 where this is the objective, else 0. To 1e-5 of the unit of time; a
     range of a kilometre is known to the 1e-7 of it to which the mesh was refined."""
-    point = refined(name)
+    point = refined(name, starts=1)
     (along,) = point.hamiltonian.values()
     assert along == pytest.approx(np.full(len(along), value), abs=max(1e-5, 1e-7 * abs(float(point.F[0]))))
 
 
 @pytest.mark.slow
 def test_the_hamiltonian_of_a_launcher_is_constant_in_each_phase():
-    point = refined("delta_iii")
+    point = refined("delta_iii", starts=1)
     for H in point.hamiltonian.values():
         assert np.ptp(H) <= 1e-5 * max(1.0, np.abs(H).max())
     assert point.hamiltonian["second stage"] == pytest.approx(0.0, abs=1e-5), "only its end is free"
