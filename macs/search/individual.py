@@ -114,7 +114,8 @@ def individual_actions(trials: Trials) -> None:
 
     attempt(along_velocity, settings.keep_velocity)
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
-    scanned = settings.coordinates_to_scan(d, len(state.parents), state.directions.shape[1], trials.planned)
+    filled = state.parents if settings.breeding != 0.0 else state.archive  # where nothing is bred, agents alone lower violations
+    scanned = settings.coordinates_to_scan(d, len(filled), state.directions.shape[1], trials.planned)
     for coordinate in order.T[:scanned]:
         length = rng.random((2, count)) ** settings.concentration * agents.rho / 2
         side = rng.choice([-1.0, 1.0], count)

@@ -109,8 +109,8 @@ class Settings:
         Fraction of the coordinates that pattern search tries, in (0, 1], if `adaptive_coordinates` is off (Table I: 1).
     adaptive_coordinates : bool, default True
         Pattern search tries all coordinates while the archive is empty, and one when it is full (the authors' later code). As long as
-        nothing is feasible the least violated points, as many as the archive may have, stand for it. An iteration takes at most an eighth
-        of the budget for it.
+        nothing is feasible the least violated points, as many as the archive may have, stand for it, unless `breeding` is 0. An iteration
+        takes at most an eighth of the budget for it.
     lone : int, optional
         Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead; in an
         iteration as many of them act as there are `agents`. So they

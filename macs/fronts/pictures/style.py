@@ -70,7 +70,7 @@ def blank_figure(width: float = 5.5, height: float = 4.0) -> Any:
 
 
 def _number_plainly(figure: Any) -> None:
-    """Let new axes of a figure have plain numbers: matplotlib sets each as a formula, a third of the time that a picture takes."""
+    """Let new axes of a figure have plain numbers: matplotlib sets each as a formula, which takes long."""
     from matplotlib.ticker import ScalarFormatter
 
     from .ticks import PlainNumbers
