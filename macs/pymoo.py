@@ -349,7 +349,7 @@ class Told(BlackBox):
                 raise Asked(X)
             batch = self._more(X)
         self._batch = batch
-        return _columns(batch.get("F"), len(X)), _violation(batch)[:, None]
+        return _columns(batch.get("F"), len(X)), _residuals(batch)
 
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         evaluation, iterations = super()._evaluate(Z, way)
@@ -394,15 +394,16 @@ def _check_problem(problem: Any) -> None:
     raise ValueError(f"MACS: problem {problem.name()} has {found}; it searches arrays of real variables only (vtype=float, xl, xu)")
 
 
-def _violation(batch: Population) -> np.ndarray:
-    """Largest violation (k,) of any constraint, 0 where a point is feasible by pymoo; the CV of infeasible points without constraints."""
-    feasible = _columns(batch.get("FEAS"), len(batch)).all(axis=1)
-    if feasible.all():
-        return np.zeros(len(batch))
+def _residuals(batch: Population) -> np.ndarray:
+    """Residuals (k, c) of inequalities, then of equalities, beyond what pymoo allows: 0 where a point is feasible by pymoo. The last column
+    is the CV of points that are infeasible for another reason."""
+    feasible = (_columns(batch.get("FEAS"), len(batch)) != 0.0).all(axis=1, keepdims=True)
     G, H, CV = (_columns(batch.get(name), len(batch)) for name in ("G", "H", "CV"))
     ease = batch[0].config
-    worst = np.hstack([G - ease["cv_ieq"]["eps"], np.abs(H) - ease["cv_eq"]["eps"]]).max(axis=1, initial=0.0)
-    return np.where(feasible, 0.0, np.where(worst > 0.0, worst, CV.max(axis=1)))
+    over, off = np.maximum(G - ease["cv_ieq"]["eps"], 0.0), np.copysign(np.maximum(np.abs(H) - ease["cv_eq"]["eps"], 0.0), H)
+    found = np.hstack([over, off])
+    other = np.where((found != 0.0).any(axis=1), 0.0, CV.max(axis=1, initial=0.0))
+    return np.where(feasible, 0.0, np.column_stack([found, other]))
 
 
 def _columns(values: Any, count: int) -> np.ndarray:

@@ -60,6 +60,8 @@ class CompiledVectorProblem:
         None: as many columns as the function returns, each at most 0, with a scale of 1.
     rows : callable
         See `Rows`. A row with NaN is a failed evaluation.
+    equalities : tuple of int
+        Without `limits`: columns that have to be 0, instead of at most 0.
     address, data
         As of `CompiledProblem`.
 
@@ -77,6 +79,7 @@ class CompiledVectorProblem:
     rows: Rows
     address: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)
+    equalities: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
         variables, goals = (", ".join(one.name for one in group) for group in (self.variables, self.goals))
@@ -97,18 +100,20 @@ class CompiledVectorProblem:
         return np.array([goal.sign for goal in self.goals])
 
     def evaluate(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Objectives (n, m), all minimised, and violations (n, c), at least 0, of rows (n, d).
+        """Objectives (n, m), all minimised, and residuals (n, c) of rows (n, d).
 
-        A violation is the excess over a limit divided by the limit's scale. NaN where the function returned it.
+        A residual is the excess over a limit divided by the limit's scale, negative below a lower limit, and 0 within both. NaN where the
+        function returned it.
         """
         values, bounded = self.rows(X.copy())
         if self.goals and values.shape[1] != len(self.goals):
             raise ValueError(f"objectives: function returned {values.shape[1]}, {len(self.goals)} expected")
         F = values * self.signs if self.goals else values
         if self.limits is None:
-            return F, np.maximum(bounded, 0.0)
+            equal = np.isin(np.arange(bounded.shape[1]), self.equalities)
+            return F, np.where(equal, bounded, np.maximum(bounded, 0.0))
         lower, upper, scale = (np.array([getattr(limit, side) for limit in self.limits]) for side in ("lower", "upper", "scale"))
-        return F, np.maximum(np.maximum(lower - bounded, bounded - upper), 0.0) / scale
+        return F, (np.maximum(bounded - upper, 0.0) - np.maximum(lower - bounded, 0.0)) / scale
 
     @cached_property
     def fingerprint(self) -> str:

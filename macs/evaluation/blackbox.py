@@ -69,10 +69,10 @@ class BlackBox(Evaluator):
         return np.array(candidates, dtype=float)
 
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
-        F, violations = self.problem.evaluate(Z)
+        F, residuals = self.problem.evaluate(Z)
         self.m_known = learned(self.m_known, F.shape[1], f"function returned {F.shape[1]}")
-        violation = violations.max(axis=1, initial=0.0)
+        violation = np.abs(residuals).max(axis=1, initial=0.0)
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))
         F[failed], violation[failed] = np.nan, np.inf
         status = np.where(failed, FAILED, np.where(violation <= self.tolerance, CONVERGED, INFEASIBLE))
-        return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status, itemise=lambda: violations), 0
+        return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status, residuals=residuals), 0

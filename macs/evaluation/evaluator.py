@@ -46,6 +46,9 @@ class Evaluation:
         What the evaluation took; see `Counts`.
     itemise : callable, optional
         Function that returns `violations`; called only when they are needed.
+    residuals : array (k, c), optional
+        Scaled residual of each constraint, positive above an upper limit, negative below a lower one, 0 within both; of what can be
+        evaluated anywhere, without an inner level.
 
     Examples
     --------
@@ -64,10 +67,13 @@ class Evaluation:
     fallbacks: int = 0
     work: int = 0
     itemise: Callable[[], np.ndarray] | None = field(default=None, repr=False, compare=False)
+    residuals: np.ndarray | None = field(default=None, repr=False, compare=False)
 
     @property
     def violations(self) -> np.ndarray:
         """Largest scaled residual of each constraint (k, c), at least 0; a single column (k, 1) if only the largest of all is known."""
+        if self.residuals is not None:
+            return np.abs(self.residuals)
         return self.violation[:, None] if self.itemise is None else self.itemise()
 
     def joined(self, other: Evaluation) -> Evaluation:

@@ -52,7 +52,9 @@ def plain_problem(
         If an argument has the wrong type or shape; the message names it.
     """
     m: int | None = None
+    equalities: tuple[int, ...] = ()
     if _is_pymoo(function):
+        equalities = tuple(range(int(function.n_ieq_constr), int(function.n_ieq_constr + function.n_eq_constr)))
         bounds = _pymoo_bounds(function) if bounds is None else bounds
         m = int(function.n_obj)
         function = _pymoo_function(function)
@@ -78,6 +80,7 @@ def plain_problem(
         goals=() if m is None else default_goals(m, labels["names"], labels["units"], labels["senses"]),
         limits=None,
         rows=PlainRows(function, constraints),
+        equalities=equalities,
     )
 
 
@@ -199,7 +202,7 @@ def _pymoo_function(problem: Any) -> Callable[[np.ndarray], Outputs]:
         out = problem.evaluate(X, return_values_of=["F", "G", "H"], return_as_dictionary=True)
         inequality, equality = out.get("G"), out.get("H")
         columns = [] if inequality is None or not np.size(inequality) else [inequality]
-        columns += [] if equality is None or not np.size(equality) else [np.abs(equality)]
+        columns += [] if equality is None or not np.size(equality) else [equality]
         return (out["F"], np.hstack(columns)) if columns else out["F"]
 
     return function

@@ -48,7 +48,7 @@ def evaluated_again(problem: CompiledVectorProblem, Z: np.ndarray) -> tuple[np.n
     F, found = problem.evaluate(np.array(Z, dtype=float))
     beyond = excess(np.asarray(Z, dtype=float)[:, None], problem.variables)
     names = [*(limit.name for limit in limits), *(f"bounds of {v.name}" for v in problem.variables)]
-    amounts = np.hstack([found, beyond])
+    amounts = np.hstack([np.abs(found), beyond])
     failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(found).all(axis=1))
     F = np.where(failed[:, None], np.nan, F)
     violations = [

@@ -59,6 +59,10 @@ class Archive:
         """The points of this archive, then the others, all of them."""
         return type(self)(*map(np.concatenate, zip(self.columns(), others.columns(), strict=True)))
 
+    def has(self, F: np.ndarray) -> np.ndarray:
+        """Mask (k,) of the objectives F (k, m) that are those of a point."""
+        return (F[:, None] == self.F).all(axis=2).any(axis=1)
+
     def replaced(self, rows: np.ndarray, others: Any) -> Archive:
         """The points, with those of the mask `rows` (n,) replaced by those in the same rows of `others`, such as an `Evaluation`."""
         Z, F = (np.where(rows[:, None], new, old) for new, old in ((others.Z, self.Z), (others.F, self.F)))

@@ -154,9 +154,14 @@ def updated_credit(credit: np.ndarray, operator: np.ndarray, kept: np.ndarray) -
     return (1.0 - FORGET) * credit + np.stack([won, tried], axis=1)
 
 
+def success_rates(credit: np.ndarray) -> np.ndarray:
+    """Success rates (o,), positive, from the credit (o, 2)."""
+    return (credit[:, 0] + 0.1) / (credit[:, 1] + 1.0)
+
+
 def operator_shares(credit: np.ndarray) -> np.ndarray:
     """Probabilities (o,) of the operators: by their success rates, with a least share for each (Thierens 2005)."""
-    rate = (credit[:, 0] + 0.1) / (credit[:, 1] + 1.0)
+    rate = success_rates(credit)
     return LEAST_SHARE + (1.0 - LEAST_SHARE * len(rate)) * rate / rate.sum()
 
 
@@ -246,5 +251,4 @@ def breed_archive(trials: Trials) -> None:
         return
     remember(state, trials.seen, settings, evaluator)
     if not fixed:
-        kept = (result.F[:, None] == np.vstack([state.archive.F, state.outside.F])).all(axis=2).any(axis=1)
-        state.credit = updated_credit(state.credit, operator[bred], kept)
+        state.credit = updated_credit(state.credit, operator[bred], state.archive.joined(state.outside).has(result.F))

@@ -18,6 +18,7 @@ from transcription.meshed import Meshed
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
+from ..evaluation.linear_models import Samples
 from ..front import Front
 from ..fronts.merging import best_rows
 from ..gradients.counted import CountedSolves, PolishLog
@@ -36,6 +37,7 @@ from .effort import Gains, credited, no_effort, spent
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
 from .opening import Opening, anew
+from .restoration import restore
 from .rounds import PLANNED, SOLVES, Rounds, judged, least
 from .settings import Settings
 from .social import assign, social_actions
@@ -105,6 +107,8 @@ class MACS(Settings, Solver):
             directions=directions.pool(m, self.directions or 100 * m),
             experience=np.empty((0, len(evaluator.free))),
             credit=no_credit(len(OPERATORS)),
+            samples=Samples.none(len(evaluator.free)),
+            restored=no_credit(2),
             effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1]) if gradients else no_effort(0, 0),
             iteration=0,
             evaluations=evaluator.counts.evaluations,
@@ -157,12 +161,16 @@ class MACS(Settings, Solver):
         if state.evaluations >= budget:
             return
         self._begin_anew(state, evaluator)
+        seen: list[Evaluation] = []
         for actions in (individual_actions, social_actions):
             trials = Trials(self, state, evaluator, budget)
             actions(trials)
             remember(state, trials.seen, self, evaluator)
+            seen += trials.seen
         guide = guide_of(self.prefer, evaluator)
-        breed_archive(Trials(self, state, evaluator, budget))
+        offspring = Trials(self, state, evaluator, budget)
+        breed_archive(offspring)
+        restore(Trials(self, state, evaluator, budget), [*seen, *offspring.seen])
         if self.refines and evaluator.has_gradients:
             for _ in range(gradient_action.allowed(state.evaluations, self.refine_every, state.refinements)):
                 gains, before = Gains(state, evaluator.tolerance), evaluator.counts.work

@@ -152,6 +152,9 @@ class Settings:
         objectives, and with three where there are `lone` agents; otherwise 1; and 2 as long as nothing is feasible. If positive,
         infeasible points with better objectives than the archive's have one child each, where the inner level does not move candidates.
         0 in the paper.
+    restore : bool, default True
+        Move infeasible points that the archive does not dominate towards feasible ones, by linear models of the constraints, where the
+        inner level does not move candidates and constraints are known one by one. False in the paper.
     sample : int, optional
         Number of points of the first population, at least that of the agents. Default: the size of the archive, but at most a twentieth of
         the budget and at least the number of agents. In the paper: the number of agents.
@@ -205,6 +208,7 @@ class Settings:
     refine_every: int = 200
     polish_every: int = 20
     breeding: float | None = None
+    restore: bool = True
     sample: int | None = None
     exponent: float | None = None
     ceiling: int = 100_000
@@ -216,7 +220,7 @@ class Settings:
         for name, least in (("directions", 1), ("lone", 0), ("sample", self.agents)):
             if getattr(self, name) is not None:
                 check_count(f"MACS: {name}", getattr(self, name), least)
-        for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity"):
+        for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity", "restore"):
             if not isinstance(getattr(self, name), bool | np.bool_):
                 raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
         for name, interval in INTERVALS.items():
@@ -280,6 +284,7 @@ class Settings:
             "social_moves": False,
             "keep_velocity": False,
             "breeding": 0.0,
+            "restore": False,
             "lone": 0,
             "exponent": 2.0,
         }

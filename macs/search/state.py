@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..evaluation.evaluator import INFEASIBLE, Evaluation, Evaluator
+from ..evaluation.linear_models import Samples
 from ..gradients.counted import PolishLog
 from ..io.text import counted
 from ..pareto import archive as archives
@@ -101,6 +102,10 @@ class SearchState:
         no row once the archive has points.
     outside : Archive
         Infeasible points with better objectives than the archive's, see `archive.outside`; none where the inner level moves candidates.
+    samples : Samples
+        The last points with the residuals of all constraints, for `restoration`; none where the inner level moves candidates.
+    restored : array (2, 2)
+        Credit of points that were restored, in the second row, and of all others.
     ideal, nadir : arrays (m,)
         Best feasible values ever evaluated; worst values in the archive. NaN as long as no point was feasible.
     directions : array (k, m)
@@ -134,8 +139,8 @@ class SearchState:
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
-        "ideal": "m", "nadir": "m", "directions": "k m", "experience": "e d", "credit": "o 2", "effort": "w 4", "alike": "m bool",
-        "in_vain": "v 2m",
+        "ideal": "m", "nadir": "m", "directions": "k m", "experience": "e d", "credit": "o 2", "restored": "2 2", "effort": "w 4",
+        "alike": "m bool", "in_vain": "v 2m",
     }  # fmt: skip
     INDICES: ClassVar[dict[str, str]] = {"agents.direction": "directions"}
 
@@ -143,6 +148,8 @@ class SearchState:
     archive: Archive
     closest: Archive
     outside: Archive
+    samples: Samples
+    restored: np.ndarray
     ideal: np.ndarray
     nadir: np.ndarray
     directions: np.ndarray

@@ -144,8 +144,8 @@ def test_known_fronts_are_found():
     x = np.linspace(0, 1, 2001)
     assert distance_to_curve(res.F, np.column_stack([x, 1 - np.sqrt(x)])).max() < 5e-3 and len(res.F) == 20
     bnh = get_problem("bnh")
-    res = minimize(bnh, MACS(archive=30), ("n_eval", 2_000), seed=1)
-    assert distance_to_curve(res.F, bnh.pareto_front()).max() < 2e-3
+    res = minimize(bnh, MACS(archive=30), ("n_eval", 5_000), seed=1)
+    assert distance_to_curve(res.F, bnh.pareto_front()).max() < 5e-3
     assert (res.G <= 0).all() and (res.CV == 0).all() and len(res.X) == 30 == len(res.opt)
 
 
@@ -164,7 +164,7 @@ def test_one_objective_gives_one_point_as_pymoo_does():
 def test_equality_constraints_are_met_as_pymoo_asks():
     res = minimize(Equality(), MACS(), ("n_eval", 3_000), seed=1)
     assert len(res.F) > 5 and (np.abs(res.H) <= 1e-4).all() and (res.CV == 0).all()
-    assert np.abs(np.linalg.norm(res.X, axis=1) - 1).max() < 1e-4
+    assert np.abs(np.linalg.norm(res.X, axis=1) - 1).max() < 1e-4 and (res.X > -0.1).all()
 
 
 # The course of a run

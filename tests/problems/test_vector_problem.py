@@ -22,24 +22,24 @@ def test_objectives_are_minimised_and_violations_scaled_by_the_size_of_the_limit
 
 
 @pytest.mark.parametrize(
-    ("limits", "value", "violation"),
+    ("limits", "value", "residual"),
     [
         ({"upper": 200.0}, 300.0, 0.5),
-        ({"lower": -200.0}, -300.0, 0.5),
-        ({"lower": 10.0, "upper": 14.0}, 9.0, 0.25),
+        ({"lower": -200.0}, -300.0, -0.5),
+        ({"lower": 10.0, "upper": 14.0}, 9.0, -0.25),
         ({"lower": 8.0, "upper": 8.0}, 10.0, 0.25),
         ({"upper": 0.0}, 3.0, 3.0),
         ({"upper": 200.0, "scale": 50.0}, 300.0, 2.0),
         ({"upper": 200.0}, 199.0, 0.0),
     ],
 )
-def test_what_counts_as_one_in_a_constraint(limits, value, violation):
+def test_what_counts_as_one_in_a_constraint(limits, value, residual):
     problem = VectorProblem("scaled")
     problem.variable("x", bounds=(0, 1))
     problem.minimize("f")
     problem.constraint("g", **limits)
     problem.function(lambda X: {"f": X[:, 0], "g": np.full(len(X), value)})
-    assert problem.compile().evaluate(np.zeros((3, 1)))[1].tolist() == [[violation]] * 3
+    assert problem.compile().evaluate(np.zeros((3, 1)))[1].tolist() == [[residual]] * 3
 
 
 def test_mistakes_in_the_statement_name_the_users_own_things():

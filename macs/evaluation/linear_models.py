@@ -1,0 +1,106 @@
+"""Linear models of the constraints from points that were evaluated already, and the steps to where these models have no residual.
+
+A black box has no derivatives. Residuals at points nearby replace them: the model of a constraint is the linear function that fits these
+best, the nearest most; where they are too few for that, the flattest of all (Conn, Scheinberg and Vicente 2009, chapters 4 and 5). The step
+is the shortest to the zero of all models, as with gradients in the repair of Chootinan and Chen (2006).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from .box import Box
+
+MEMORY = 500
+"""Most points that are kept, the last ones."""
+MOST = 40
+"""Most points that a model is made of; else two for each variable and two more."""
+FLAT, ALIKE = 1e-6, 1e-3
+"""Singular values below these parts of the largest count as zero: of the points around, of the gradients of unit length."""
+BEYOND = 0.02
+"""Part of the residuals by which a step goes beyond the zero of their models, so that it ends inside of limits."""
+
+
+@dataclass(frozen=True, repr=False)
+class Samples:
+    """Evaluated points with the residuals of all constraints, oldest first.
+
+    Attributes
+    ----------
+    X : array (s, d)
+        In the unit box.
+    residuals : array (s, c)
+        See `Evaluation.residuals`.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"X": "s d", "residuals": "s c"}
+
+    X: np.ndarray
+    residuals: np.ndarray
+
+    @classmethod
+    def none(cls, d: int) -> Self:
+        """No point of d variables; the number of constraints is that of the first points that are added."""
+        return cls(np.empty((0, d)), np.empty((0, 0)))
+
+    def __len__(self) -> int:
+        return len(self.X)
+
+    def __repr__(self) -> str:
+        return f"<Samples: {len(self)} with {self.residuals.shape[1]} residuals>"
+
+    def joined(self, X: np.ndarray, residuals: np.ndarray) -> Self:
+        """The last of these points and of others, at most `MEMORY`."""
+        if not len(self):
+            return type(self)(X[-MEMORY:], residuals[-MEMORY:])
+        return type(self)(np.vstack([self.X, X])[-MEMORY:], np.vstack([self.residuals, residuals])[-MEMORY:])
+
+
+def steps_to_zero(box: Box, X: np.ndarray, residuals: np.ndarray, samples: Samples) -> np.ndarray:
+    """Steps (k, d) from points X (k, d) to where the models of their residuals (k, c) are zero, or as near to it as the bounds allow.
+
+    A constraint without a residual at a point has no part in its step. No step is longer than the distance of the farthest point that its
+    models are made of. It is zero where no other point is known.
+    """
+    squared = box.squared_distances(X, samples.X)
+    squared[squared == 0.0] = np.inf
+    order = np.argsort(squared, axis=1, kind="stable")[:, : min(2 * X.shape[1] + 2, MOST)]
+    steps = np.zeros_like(X)
+    for row, near in enumerate(order):
+        near = near[np.isfinite(squared[row, near])]
+        violated = np.flatnonzero(residuals[row])
+        if len(near) and len(violated):
+            apart, amount = np.sqrt(squared[row, near]), residuals[row, violated]
+            change = samples.residuals[near][:, violated] - amount
+            slopes = _gradients(box.difference(samples.X[near], X[row]), change, apart)
+            step = _step(box, X[row], amount, slopes)
+            steps[row] = step * min(1.0, apart.max() / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
+    return steps
+
+
+def _gradients(steps: np.ndarray, change: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Gradients (c, d) of the linear models of changes (n, c) by steps (n, d) of lengths `apart` (n,), by which they are divided."""
+    return (np.linalg.pinv(steps / apart[:, None], rcond=FLAT) @ (change / apart[:, None])).T
+
+
+def _step(box: Box, x: np.ndarray, amount: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+    """The shortest step (d,) from x (d,) by which residuals `amount` (c,) with these gradients (c, d) vanish; variables that it would move
+    beyond a bound stay there, and the others do more."""
+    sizes = np.linalg.norm(gradients, axis=1)
+    known = sizes > 0.0
+    directions, wanted = gradients[known] / sizes[known, None], -(1.0 + BEYOND) * amount[known] / sizes[known]
+    step, free = np.zeros(len(x)), np.ones(len(x), dtype=bool)
+    while len(wanted) and free.any():
+        fixed = np.where(free, 0.0, step)
+        step = fixed.copy()
+        step[free] = np.linalg.pinv(directions[:, free], rcond=ALIKE) @ (wanted - directions @ fixed)
+        end = x + step
+        beyond = free & ~box.wraps & ((end < 0.0) | (end > 1.0))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(end, 0.0, 1.0)[beyond] - x[beyond]
+        free &= ~beyond
+    return step
