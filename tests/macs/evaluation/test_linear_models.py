@@ -1,0 +1,99 @@
+"""Linear models of constraints from points around, and the steps to their zero, against projections in closed form."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from macs.evaluation.box import Box
+from macs.evaluation.linear_models import BEYOND, MEMORY, Samples, steps_to_zero
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def box(d, wraps=()):
+    return Box(np.zeros(d), np.ones(d), np.isin(np.arange(d), wraps))
+
+
+def around(x, radius, count, residual, rng):
+    """Points near x with their residuals."""
+    X = x + radius * rng.uniform(-1.0, 1.0, (count, len(x)))
+    return Samples.none(len(x)).joined(X, residual(X))
+
+
+@given(SEEDS, st.integers(1, 8), st.data())
+def test_the_step_is_the_projection_onto_planes(seed, d, data):
+    """As long as no bound is in the way: the shortest step to A x = b, by the pseudoinverse, and a little more."""
+    c, rng = data.draw(st.integers(1, d)), np.random.default_rng(seed)
+    A = np.linalg.qr(rng.standard_normal((d, d)))[0][:c] * rng.uniform(0.1, 1e4, (c, 1))
+    x = np.full(d, 0.5)
+    b = A @ (x + 0.01 * rng.uniform(-1.0, 1.0, d))
+    known = around(x, 0.2, 2 * d + 2, lambda X: X @ A.T - b, rng)
+    step = steps_to_zero(box(d), x[None], (A @ x - b)[None], known)[0]
+    assert step == pytest.approx(-(1.0 + BEYOND) * np.linalg.pinv(A) @ (A @ x - b), rel=1e-6, abs=1e-12)
+
+
+def test_constraints_without_a_residual_have_no_part():
+    rng, x = np.random.default_rng(1), np.array([0.5, 0.5, 0.5])
+    known = around(x, 0.1, 8, lambda X: np.column_stack([X[:, 0] - 0.4, np.maximum(X[:, 1] - 0.6, 0.0)]), rng)
+    step = steps_to_zero(box(3), x[None], np.array([[0.1, 0.0]]), known)[0]
+    assert step == pytest.approx([-0.1 * (1.0 + BEYOND), 0.0, 0.0], abs=1e-9)
+
+
+def test_variables_at_a_bound_leave_the_rest_to_the_others():
+    """The nearest point of the plane x1 + x2 + x3 = 0.6 in the box, from (0.02, 0.5, 0.5), has x1 = 0: (0, 0.3, 0.3)."""
+    rng, x = np.random.default_rng(1), np.array([0.02, 0.5, 0.5])
+    known = around(x, 0.4, 8, lambda X: X.sum(axis=1, keepdims=True) - 0.6, rng)
+    step = steps_to_zero(box(3), x[None], np.array([[0.42]]), known)[0]
+    over = BEYOND * 0.42 / 2
+    assert x + step == pytest.approx([0.0, 0.3 - over, 0.3 - over], abs=1e-9)
+
+
+def test_what_no_point_of_the_box_can_meet_ends_at_its_corner():
+    rng, x = np.random.default_rng(1), np.array([0.9, 0.8])
+    known = around(x, 0.3, 5, lambda X: X.sum(axis=1, keepdims=True) + 1.0, rng)
+    far = np.vstack([known.X, [[-1.0, -1.0]]])
+    step = steps_to_zero(box(2), x[None], np.array([[2.7]]), Samples(far, far.sum(axis=1, keepdims=True) + 1.0))[0]
+    assert x + step == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_steps_take_the_shorter_way_around():
+    x = np.array([0.98, 0.5])
+    X = np.array([[0.02, 0.5], [0.96, 0.5], [0.98, 0.6]])
+    turn = lambda X: (np.mod(X[:, :1] - 0.5, 1.0) - 0.5) - 0.01  # noqa: E731 - 0 at 0.01, which is beyond the bound
+    step = steps_to_zero(box(2, [0]), x[None], turn(x[None]), Samples(X, turn(X)))[0]
+    assert step == pytest.approx([0.03 * (1.0 + BEYOND), 0.0], abs=1e-9)
+
+
+def test_no_step_is_longer_than_what_is_known_reaches():
+    x = np.array([0.5])
+    known = Samples(np.array([[0.51], [0.49]]), np.array([[0.99], [1.01]]))
+    assert steps_to_zero(box(1), x[None], np.array([[1.0]]), known)[0] == pytest.approx([0.01])
+
+
+def test_where_nothing_else_is_known_no_step_is_made():
+    x = np.array([[0.5, 0.5]])
+    assert not steps_to_zero(box(2), x, np.array([[1.0]]), Samples(x, np.array([[1.0]]))).any()
+    flat = Samples(np.array([[0.4, 0.5], [0.6, 0.5]]), np.ones((2, 1)))
+    assert not steps_to_zero(box(2), x, np.array([[1.0]]), flat).any()
+
+
+def test_a_few_steps_lead_to_a_curved_constraint():
+    """Each makes the models better: from a residual of a tenth to 1e-5 in six steps, on a sphere in five dimensions."""
+    rng = np.random.default_rng(1)
+    sphere = lambda X: ((X - 0.5) ** 2).sum(axis=1, keepdims=True) - 0.09  # noqa: E731
+    for _ in range(20):
+        u = rng.standard_normal(5)
+        x = 0.5 + np.sqrt(0.09 + rng.uniform(-0.05, 0.1)) * u / np.linalg.norm(u)
+        known = around(x, 0.05, 12, sphere, rng)
+        for _ in range(6):
+            x = x + steps_to_zero(box(5), x[None], sphere(x[None]), known)[0]
+            known = known.joined(x[None], sphere(x[None]))
+        assert abs(sphere(x[None])[0, 0]) < 1e-5
+
+
+def test_only_the_last_points_are_kept():
+    first = Samples.none(1).joined(np.zeros((MEMORY, 1)), np.zeros((MEMORY, 2)))
+    both = first.joined(np.ones((3, 1)), np.ones((3, 2)))
+    assert len(first) == len(both) == MEMORY and both.X.sum() == 3.0 and both.residuals.sum() == 6.0
+    assert repr(both) == f"<Samples: {MEMORY} with 2 residuals>"

@@ -1,0 +1,167 @@
+"""Restoration of infeasible points: fronts on thin feasible sets, published optima with equalities, and what it costs elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from boxes import boxed
+from pymoo.core.problem import Problem
+from pymoo.problems import get_problem
+
+from macs.evaluation.evaluator import Evaluation
+from macs.search import restoration
+from macs.search.macs import MACS
+from macs.search.trials import Trials
+from problems import VectorProblem
+
+
+class Sphere(Problem):
+    """Squared distances from two points of a sphere in d dimensions, on which all points have to be: the front is the arc between the two,
+    where F = 2 - 2 (cos a, sin a)."""
+
+    def __init__(self, d: int, words: str = "H") -> None:
+        super().__init__(n_var=d, n_obj=2, xl=-2.0, xu=2.0, **{"n_eq_constr" if words == "H" else "n_ieq_constr": 1})
+        self.words = words
+
+    def _evaluate(self, x, out, *args, **kwargs) -> None:
+        ends = np.eye(self.n_var)[:2]
+        out["F"] = ((x[:, None] - ends) ** 2).sum(axis=2)
+        h = (x**2).sum(axis=1, keepdims=True) - 1.0
+        out[self.words] = h if self.words == "H" else np.abs(h) - 1e-4
+
+
+def off_the_arc(F):
+    """Distances (n,) of points from the circle that the front is a quarter of, and the largest angle between neighbours, ends included."""
+    c = 1.0 - F / 2.0
+    angle = np.sort(np.arctan2(c[:, 1], c[:, 0]))
+    return np.abs(np.linalg.norm(c, axis=1) - 1.0), np.diff(np.concatenate([[0.0], angle, [np.pi / 2]])).max()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_front_on_a_thin_feasible_set_is_covered(seed):
+    """With a tolerance of 1e-6. Without restoration three points at most are found, or a part of the arc."""
+    front = MACS(archive=30).minimize(Sphere(5), evaluations=10_000, seed=seed, progress=False)
+    far, gap = off_the_arc(front.F)
+    assert len(front) == 30 and far.max() < 0.02 and gap < 0.2
+    alone = MACS(archive=30, restore=False).minimize(Sphere(5), evaluations=10_000, seed=seed, progress=False)
+    assert len(alone) < 10 or off_the_arc(alone.F)[1] > 0.5
+
+
+def test_equalities_that_are_stated_as_a_band_of_absolute_values():
+    """Their residuals have one sign on both sides, which makes models worse, not useless."""
+    front = MACS(archive=30).minimize(Sphere(4, "G"), evaluations=10_000, seed=1, progress=False)
+    assert len(front) == 30 and off_the_arc(front.F)[1] < 0.5
+
+
+@pytest.mark.parametrize(("name", "optimum", "near"), [("g5", 5126.4967, 1e-4), ("g13", 0.0539415, 1e-2), ("g15", 961.7150222899, 1e-5)])
+def test_published_optima_with_equalities_are_found(name, optimum, near):
+    """Two or three nonlinear equalities, to 1e-6. Optima: Liang and others, Problem definitions for the CEC 2006 special session on
+    constrained real-parameter optimization, 2006, where equalities hold to 1e-4."""
+    front = MACS().minimize(get_problem(name), evaluations=10_000, seed=1, progress=False)
+    assert front.F[0, 0] == pytest.approx(optimum, rel=near)
+
+
+def test_constraints_of_unlike_scales_are_met_together(seed=1):
+    """g21 has residuals from 1 to 1e6 in size: the first feasible point within 1000 evaluations, where there was none after 20,000."""
+    front = MACS().minimize(get_problem("g21"), evaluations=1000, seed=seed, progress=False)
+    assert len(front) and front.violation.max() <= 1e-6
+
+
+def test_a_portfolio_of_assets_that_are_independent():
+    """Variance against return of shares that sum to one, a constraint with one value. The least variance has shares as 1 / variance of each
+    asset, the largest return has one asset."""
+    variances, returns = np.linspace(0.5, 2.0, 8), np.linspace(0.1, 1.0, 8)
+    problem = VectorProblem("portfolio")
+    for i in range(8):
+        problem.variable(f"share {i + 1}", bounds=(0.0, 1.0))
+    problem.minimize("variance")
+    problem.maximize("return")
+    problem.constraint("sum", lower=1.0, upper=1.0)
+    problem.function(lambda X: {"variance": X**2 @ variances, "return": X @ returns, "sum": X.sum(axis=1)})
+    front = MACS(archive=20).solve(problem, evaluations=10_000, seed=1, progress=False)
+    assert len(front) == 20 and np.abs(front.decision.sum(axis=1) - 1.0).max() <= 1e-6
+    assert front.F[:, 0].min() == pytest.approx(1.0 / (1.0 / variances).sum(), rel=0.06)
+    assert front.F[:, 1].min() == pytest.approx(-1.0, abs=0.01)
+
+
+def restored(name, evaluations, seed=1):
+    """The part of the evaluations that restoration takes, and the last success rates."""
+    evaluator, solver, taken = boxed(get_problem(name)), MACS(archive=30), 0
+    state = solver.begin(evaluator, evaluations, np.random.default_rng(seed))
+
+    def counted(trials, seen):
+        nonlocal taken
+        before = trials.state.evaluations
+        restore(trials, seen)
+        taken += trials.state.evaluations - before
+
+    restore = restoration.restore
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("macs.search.macs.restore", counted)
+        while state.evaluations < evaluations:
+            solver.advance(state, evaluator, evaluations)
+    return taken / evaluations
+
+
+def test_as_many_points_are_restored_as_pays():
+    assert 0.0 < restored("bnh", 3000) < 0.05 and restored("truss2d", 3000) < 0.05
+    assert restored("g13", 3000) > 0.1
+
+
+def test_points_whose_evaluation_fails_are_no_sample():
+    def function(X):
+        F = np.column_stack([X[:, 0], X[:, 1]])
+        F[X[:, 0] > 1.5] = np.nan
+        return F, 1.0 - X[:, :1] * X[:, 1:]
+
+    evaluator = boxed(function, [(0.0, 2.0)] * 2)
+    state = MACS(archive=20).begin(evaluator, 1000, np.random.default_rng(1))
+    while state.evaluations < 1000:
+        MACS(archive=20).advance(state, evaluator, 1000)
+    assert np.isfinite(state.samples.residuals).all() and state.samples.X[:, 0].max() <= 0.75 and len(state.archive) == 20
+
+
+def state_of(evaluator):
+    state = MACS().begin(evaluator, 100, np.random.default_rng(1))
+    return state, Trials(MACS(), state, evaluator, 100)
+
+
+def test_nothing_is_restored_where_constraints_are_not_known_one_by_one():
+    evaluator = boxed(lambda X: (X, 1.0 - X[:, :1]), [(0.0, 2.0)] * 2)
+    state, trials = state_of(evaluator)
+    seen = evaluator.evaluate(np.array([[0.5, 0.5], [0.2, 1.0]]))
+    before = state.evaluations = evaluator.counts.evaluations
+    restoration.restore(trials, [replace(seen, residuals=None)])
+    evaluator.moves = True
+    restoration.restore(trials, [seen])
+    evaluator.moves = False
+    restoration.restore(Trials(MACS.paper(), state, evaluator, 100), [seen])
+    free = boxed(lambda X: X, [(0.0, 2.0)] * 2)
+    restoration.restore(state_of(free)[1], [free.evaluate(np.ones((2, 2)))])
+    assert evaluator.counts.evaluations == before and not len(state.samples)
+    restoration.restore(trials, [seen])
+    assert evaluator.counts.evaluations > before and len(state.samples) > 2
+
+
+def test_the_budget_holds_and_a_resumed_search_continues_to_the_same_bits(tmp_path):
+    solver, problem = MACS(archive=10), Sphere(3)
+    whole = solver.minimize(problem, evaluations=1503, seed=1, progress=False)
+    assert whole.stats["evaluations"] == 1503
+
+    def stop(view):
+        return view.evaluations > 700
+
+    kept = tmp_path / "run.ckpt"
+    half = solver.minimize(problem, evaluations=1503, seed=1, progress=False, callback=stop, checkpoint=kept)
+    assert half.stats["evaluations"] < 1503
+    again = solver.minimize(problem, evaluations=1503, seed=1, progress=False, checkpoint=kept)
+    assert np.array_equal(again.F, whole.F)
+
+
+def test_residuals_have_signs():
+    one = Evaluation(np.zeros((1, 1)), np.zeros((1, 1)), np.ones(1), np.array(["infeasible"]), residuals=np.array([[-1.0, 0.5, 0.0]]))
+    assert one.violations.tolist() == [[1.0, 0.5, 0.0]]
+    seen = boxed(Sphere(2)).evaluate(np.array([[0.5, 0.0], [2.0, 0.0]]))
+    assert seen.residuals is not None and seen.residuals.tolist() == [[-0.75], [3.0]] and seen.violation.tolist() == [0.75, 3.0]
+    more = boxed(Sphere(2), constraints=lambda X: X[:, 0] - 1.0).evaluate(np.array([[0.5, 0.0], [2.0, 0.0]]))
+    assert more.residuals is not None and more.residuals.tolist() == [[-0.75, 0.0], [3.0, 1.0]]
