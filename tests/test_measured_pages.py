@@ -41,7 +41,7 @@ def test_every_benchmark_is_of_files():
 def made(tmp_path, monkeypatch) -> Path:
     """The page of a benchmark whose values are given."""
     rows = [Row("case", who, {"speed": [5.0], "candidates": [100.0]}) for who in ("one by one", "in one call")]
-    monkeypatch.setattr(command, "_run", lambda one, found, quick, seeds: found.extend(rows) or False)
+    monkeypatch.setattr(command, "_run", lambda one, found, effort: found.extend(rows) or False)
     page = tmp_path / "bench-population.md"
     assert main(["bench", "population", "--quick", "--page", str(page)]) == 0
     return page
@@ -80,7 +80,7 @@ def test_a_page_of_a_study_is_of_its_file():
 
 def test_what_was_interrupted_makes_no_page(tmp_path, monkeypatch, capsys):
     rows = [Row("case", who, {"speed": [5.0], "candidates": [100.0]}) for who in ("one by one", "in one call")]
-    monkeypatch.setattr(command, "_run", lambda one, found, quick, seeds: found.extend(rows) or True)
+    monkeypatch.setattr(command, "_run", lambda one, found, effort: found.extend(rows) or True)
     main(["bench", "population", "--page", str(tmp_path / "a.md")])
     assert "POPULATIONS" in capsys.readouterr().out and not list(tmp_path.iterdir())
 

@@ -11,7 +11,7 @@ from macs.io.interrupts import Stopped
 
 from . import density, fronts, functions, inner, methods, passages, peers, population, prefer, scale, search, standard, study
 from .measured import Row, save
-from .page import header_of, write_page
+from .page import Effort, header_of, write_page
 from .scale import generation
 
 BENCHMARKS: dict[str, Any] = {
@@ -34,21 +34,22 @@ KINDS = tuple(sorted(BENCHMARKS))
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 SEEDED = (*functions.NAMES, "prefer", "search")
 """Benchmarks that are repeated with other seeds."""
+PARALLEL = functions.NAMES
+"""Benchmarks whose runs may be made at the same time."""
 
 
-def bench(kinds: Sequence[str], quick: bool, path: str | None, page: str | None = None, seeds: int | None = None) -> bool:
-    """Run some of `KINDS`, one after the other, those of `SEEDED` with the seeds 1 to `seeds` if that is given; write all numbers to the
-    CSV file `path`, if there is one.
+def bench(kinds: Sequence[str], effort: Effort, path: str | None, page: str | None = None) -> bool:
+    """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one.
 
     The report of a single one is also written to `page`, if there is one and it was not interrupted. Returns whether all targets are met,
     see `Target`.
     """
-    header = header_of(kinds[0], quick, page, seeds) if page else None
+    header = header_of(kinds[0], effort, page) if page else None
     measured: list[tuple[str, Row]] = []
     missed: list[str] = []
     for kind in kinds:
         rows: list[Row] = []
-        ended = _run(kind, rows, quick, seeds)
+        ended = _run(kind, rows, effort)
         measured += [(kind, row) for row in rows]
         if rows:
             text = BENCHMARKS[kind].report(rows)
@@ -68,14 +69,15 @@ def bench(kinds: Sequence[str], quick: bool, path: str | None, page: str | None 
     return not missed
 
 
-def _run(kind: str, rows: list[Row], quick: bool, count: int | None = None) -> bool:
+def _run(kind: str, rows: list[Row], effort: Effort) -> bool:
     """Measure; returns whether Ctrl-C was pressed."""
+    quick, count = effort.quick, effort.seeds
     seeds = tuple(range(1, count + 1)) if count else QUICK_SEEDS if quick else SEEDS
     cases = [case for case in inner.INNER if case.quick or not quick]
     sets = {name: BENCHMARKS[name] for name in functions.NAMES}
     drawn = seeds if count else functions.SEEDS
     work: dict[str, Callable[[], None]] = {
-        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows, drawn)) for name, one in sets.items()},
+        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows, drawn, jobs=effort.jobs)) for name, one in sets.items()},
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "front": lambda: fronts.bench_fronts(rows, fronts.QUICK if quick else fronts.Effort()),
         "generation": lambda: generation.bench_generation(rows, generation.QUICK if quick else generation.FULL),

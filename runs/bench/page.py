@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import shlex
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
@@ -32,12 +33,33 @@ def sources(kind: str) -> list[Path]:
     return files + [Path(__file__).with_name(f"{name}.py") for name in SHARED]
 
 
-def header_of(kind: str, quick: bool, path: str | PathLike[str], seeds: int | None = None) -> PageHeader:
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured, as options of the command.
+
+    Attributes
+    ----------
+    quick : bool
+    seeds : int, optional
+        Seeds 1 to this number, for the benchmarks that have seeds.
+    jobs : int
+        Runs that are made at the same time, on plain functions.
+    """
+
+    quick: bool = False
+    seeds: int | None = None
+    jobs: int = 1
+
+    @property
+    def words(self) -> list[str]:
+        """The options, but for defaults."""
+        counts = {"--seeds": self.seeds, "--jobs": self.jobs if self.jobs > 1 else None}
+        return [*(["--quick"] if self.quick else []), *(word for name, count in counts.items() if count for word in (name, str(count)))]
+
+
+def header_of(kind: str, effort: Effort, path: str | PathLike[str]) -> PageHeader:
     """The header of the page of a benchmark at a path. Raises ValueError if it cannot be written into a comment."""
-    command = shlex.join(
-        ["macs", "bench", kind, *(["--quick"] if quick else []), *(["--seeds", str(seeds)] if seeds else []), "--page", str(path)]
-    )
-    return PageHeader.now(command, sources(kind))
+    return PageHeader.now(shlex.join(["macs", "bench", kind, *effort.words, "--page", str(path)]), sources(kind))
 
 
 def write_page(path: str | PathLike[str], kind: str, header: PageHeader, report: str) -> None:

@@ -167,13 +167,16 @@ def bench(arguments: Namespace) -> int:
             raise WrongCall("--seeds: --quick has one seed")
         if arguments.what and kinds[0] not in benchmarks.SEEDED:
             raise WrongCall(f"--seeds: '{kinds[0]}' has none; those with seeds are {', '.join(sorted(benchmarks.SEEDED))}")
+    if arguments.jobs > 1 and (arguments.quick or (arguments.what and kinds[0] not in benchmarks.PARALLEL)):
+        raise WrongCall(f"--jobs: searches on plain functions can be made side by side ({', '.join(benchmarks.PARALLEL)}), without --quick")
+    effort = benchmarks.Effort(arguments.quick, arguments.seeds, arguments.jobs)
     if arguments.page:
         if not arguments.what:
             raise WrongCall("--page: of which one? a page is of a single benchmark")
         check_target(arguments.page)
         with wrong_call_on_value_error():
-            benchmarks.header_of(kinds[0], arguments.quick, arguments.page, arguments.seeds)
-    return DONE if benchmarks.bench(kinds, arguments.quick, arguments.csv, arguments.page, arguments.seeds) else FAILED
+            benchmarks.header_of(kinds[0], effort, arguments.page)
+    return DONE if benchmarks.bench(kinds, effort, arguments.csv, arguments.page) else FAILED
 
 
 # Arguments

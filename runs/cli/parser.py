@@ -322,6 +322,13 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench.add_argument(
         "--seeds", metavar="N", type=_positive, help="seeds 1 to N, for searches (default: 10 on plain functions, 5 for prefer and search)"
     )
+    bench.add_argument(
+        "--jobs",
+        metavar="N",
+        type=_positive,
+        default=1,
+        help="runs at the same time, on plain functions: results are the same, but times are no longer those of a machine of its own",
+    )
     bench.add_argument("--csv", metavar="FILE", help="write the measured values to a file too, one number a line")
     bench.add_argument("--page", metavar="FILE.md", help="write the report of a single one as a page too, with the command that made it")
 

@@ -19,7 +19,7 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import load
 from problems.cases import goddard
-from runs.bench import command, density, fronts, inner, methods, passages, population, prefer, search, standard, study
+from runs.bench import Effort, command, density, fronts, inner, methods, passages, population, prefer, search, standard, study
 from runs.bench.cases import BATCH, INNER
 from runs.bench.fronts.contest import as_good
 from runs.bench.measured import Row, short
@@ -322,7 +322,7 @@ def test_ctrl_c_prints_what_there_is(small, capsys, monkeypatch, how):
         measure(case, *rest)
 
     monkeypatch.setattr(inner, "_measure", interrupted)
-    assert command.bench(("inner", "search"), True, None)
+    assert command.bench(("inner", "search"), Effort(quick=True), None)
     said = capsys.readouterr()
     assert "goddard, cold" in said.out and "goddard, warm" not in said.out and "SEARCHES" not in said.out
     assert "interrupted: these are the values measured until then" in said.err

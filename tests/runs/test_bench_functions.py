@@ -7,7 +7,7 @@ import pytest
 from plain import dtlz, uf
 
 from macs.pareto.dominance import nondominated
-from runs.bench import command, header_of
+from runs.bench import Effort, command, header_of
 from runs.bench.functions import NAMES, Contest, cases, contest, judged
 from runs.bench.functions.uf import UF
 from runs.bench.measured import Row
@@ -137,7 +137,7 @@ def test_the_best_median_is_asked_on_a_share(name, key, least, monkeypatch, caps
             for row in rows_of(one.name, key, one.evaluations, MACS=[0.0, better if i < good else 1 / better, 9.0], NSGA_II=[1.0])
         ]
         assert [one.met for one in judged.TARGETS[name](rows)] == [good == least]
-        monkeypatch.setattr(command, "_run", lambda one, found, quick, seeds, rows=rows: found.extend(rows) or False)
+        monkeypatch.setattr(command, "_run", lambda one, found, effort, rows=rows: found.extend(rows) or False)
         assert main(["bench", name]) == (0 if good == least else 1)
         assert f"{good} of {len(functions)}" in capsys.readouterr().out
     assert judged.TARGETS[name](rows[2:]) == [], "not all were measured"
@@ -166,9 +166,18 @@ def test_a_small_contest(capsys):
     assert "MW1" in text and "MISSED" not in text and all(len(line) <= 160 for line in text.splitlines())
 
 
+def test_two_processes_find_the_same():
+    alone, together = [], []
+    for rows, jobs in ((alone, 1), (together, 2)):
+        Contest("zdt").bench(rows, (1, 2), 200, ("ZDT1",), jobs)
+    assert [(row.who, row.values["igd"], row.values["volume"]) for row in alone] == [
+        (row.who, row.values["igd"], row.values["volume"]) for row in together
+    ]
+
+
 def test_ctrl_c_keeps_the_seeds_that_all_have_finished(monkeypatch):
     function = cases.zdt(1)
-    done = [solver.minimize(*function.problem(), evaluations=200, seed=1) for solver in cases.solvers(("NSGA-II",), 20).values()]
+    done = [contest.searched(contest.Run("zdt", function.name, who, 1, 200)) for who in ("MACS", "NSGA-II")]
     rows = contest.compared(function, {"MACS": [done[0]] * 2, "NSGA-II": [done[1]]})
     assert [len(row.values["igd"]) for row in rows] == [1, 1] and rows[0].of("igd") != rows[1].of("igd")
     assert contest.compared(function, {"MACS": [done[0]], "NSGA-II": []}) == []
@@ -187,11 +196,16 @@ def test_all_sets_are_kinds():
 
 def test_so_many_seeds_as_are_asked_for(monkeypatch, tmp_path, capsys):
     asked = []
-    monkeypatch.setattr(Contest, "bench", lambda self, rows, seeds, *rest: asked.append((self.name, tuple(seeds))))
+    monkeypatch.setattr(Contest, "bench", lambda self, rows, seeds, **rest: asked.append((self.name, tuple(seeds))))
     page = tmp_path / "zdt.md"
     assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--page", str(page)]) == 0
     assert asked == [("zdt", tuple(range(1, 11))), ("zdt", (1, 2, 3))]
-    assert "--seeds 3 " in header_of("zdt", False, page, 3).command
-    for call, words in ((["inner", "--seeds", "2"], "'inner' has none"), (["zdt", "--quick", "--seeds", "2"], "--quick has one seed")):
+    assert "--seeds 3 " in header_of("zdt", Effort(seeds=3), page).command
+    for call, words in (
+        (["inner", "--seeds", "2"], "'inner' has none"),
+        (["zdt", "--quick", "--seeds", "2"], "--quick has one seed"),
+        (["inner", "--jobs", "2"], "--jobs"),
+        (["uf", "--quick", "--jobs", "2"], "--jobs"),
+    ):
         assert main(["bench", *call]) == 2
         assert words in capsys.readouterr().err

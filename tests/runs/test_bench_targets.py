@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from runs.bench import command, fronts, inner, passages, peers, population, prefer, search, standard, study
+from runs.bench import Effort, command, fronts, inner, passages, peers, population, prefer, search, standard, study
 from runs.bench.command import BENCHMARKS
 from runs.bench.fronts import contest
 from runs.bench.functions import NAMES
@@ -114,7 +114,7 @@ CASES = [(kind, rows, missed) for kind, given in MET_AND_MISSED.items() for rows
 
 @pytest.mark.parametrize(("kind", "rows", "missed"), CASES, ids=[f"{kind}-{missed}" for kind, _, missed in CASES])
 def test_the_exit_code_follows_the_medians(kind, rows, missed, monkeypatch, capsys):
-    monkeypatch.setattr(command, "_run", lambda one, found, quick, seeds: found.extend(rows) or False)
+    monkeypatch.setattr(command, "_run", lambda one, found, effort: found.extend(rows) or False)
     assert main(["bench", kind]) == (1 if missed else 0)
     assert capsys.readouterr().out.count("MISSED") == missed
 
@@ -144,7 +144,7 @@ def test_verdicts_are_a_table():
 
 def test_all_that_is_missed_is_named_at_the_end(monkeypatch, capsys):
     found = {"population": a_population(3.9), "study": a_study(1.7, 0.06)}
-    monkeypatch.setattr(command, "_run", lambda one, rows, quick, seeds: rows.extend(found[one]) or False)
-    assert not command.bench(tuple(found), True, None)
+    monkeypatch.setattr(command, "_run", lambda one, rows, effort: rows.extend(found[one]) or False)
+    assert not command.bench(tuple(found), Effort(quick=True), None)
     end = capsys.readouterr().out.splitlines()[-3:]
     assert end == ["MISSED:", "  population: in one call, without a compiler", "  study: one process"]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import get_context
 
 import numpy as np
 
-from macs import Front
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 
@@ -15,7 +17,7 @@ from ...measures.indicators import hypervolume, igd
 from ...measures.references import union
 from ...measures.statistics import holm, pairwise
 from ..measured import Row, Target, table, verdicts
-from .cases import OURS, Function, Set, solvers, the_set
+from .cases import OURS, Function, solvers, the_set
 from .judged import TARGETS, columns_of
 
 SEEDS = tuple(range(1, 11))
@@ -32,16 +34,23 @@ class Contest:
 
     name: str
 
-    def bench(self, rows: list[Row], seeds: Sequence[int] = SEEDS, evaluations: int | None = None, names: Sequence[str] = ()) -> None:
+    def bench(
+        self, rows: list[Row], seeds: Sequence[int] = SEEDS, evaluations: int | None = None, names: Sequence[str] = (), jobs: int = 1
+    ) -> None:
         """Measure; `rows` are filled as values become known, also if `Stopped` ends it. Fewer `evaluations` than the set's own, and only
-        the functions of these names, if any."""
+        the functions of these names, if any; so many `jobs` at the same time."""
         chosen = the_set(self.name)
         functions = [one for one in chosen.functions if not names or one.name in names]
-        with Steps(chosen.title.lower(), len(functions) * len(seeds) * (len(chosen.rivals) + 1)) as steps:
+        contenders = (OURS, *chosen.rivals)
+        runs = [Run(self.name, one.name, who, seed, evaluations) for one in functions for seed in seeds for who in contenders]
+        with Steps(chosen.title.lower(), len(runs)) as steps, made(runs, jobs) as results:
             for function in functions:
-                fronts: dict[str, list[Front]] = {who: [] for who in (OURS, *chosen.rivals)}
+                fronts: dict[str, list[Found]] = {who: [] for who in contenders}
                 try:
-                    _search(function, chosen, seeds, evaluations, fronts, steps)
+                    for seed in seeds:
+                        for who in contenders:
+                            steps.begin(f"{function.name}, {who}, seed {seed}")
+                            fronts[who].append(next(results))
                 finally:
                     rows += compared(function, fronts)
 
@@ -70,20 +79,52 @@ class Contest:
         return "\n".join(lines)
 
 
-def _search(
-    function: Function, chosen: Set, seeds: Sequence[int], evaluations: int | None, fronts: dict[str, list[Front]], steps: Steps
-) -> None:
-    budget = min(evaluations or function.evaluations, function.evaluations)
-    for seed in seeds:
-        for who, solver in solvers(chosen.rivals, function.points).items():
-            steps.begin(f"{function.name}, {who}, seed {seed}")
-            front = solver.minimize(*function.problem(), evaluations=budget, seed=seed, progress=False)
-            if front.stats["stopped"] == "interrupted":
-                raise Stopped("interrupted")
-            fronts[who].append(front)
+@dataclass(frozen=True)
+class Run:
+    """One search: of the set with this name, a function, a solver and a seed, with so many evaluations if they are fewer than its own."""
+
+    set: str
+    function: str
+    who: str
+    seed: int
+    evaluations: int | None
 
 
-def compared(function: Function, fronts: dict[str, list[Front]]) -> list[Row]:
+@dataclass(frozen=True)
+class Found:
+    """What a search has found: objectives F (k, m), its evaluations and its seconds."""
+
+    F: np.ndarray
+    evaluations: int
+    seconds: float
+
+    def __len__(self) -> int:
+        return len(self.F)
+
+
+def searched(run: Run) -> Found:
+    """The result of a run. Raises `Stopped` if Ctrl-C ended it."""
+    chosen = the_set(run.set)
+    function = next(one for one in chosen.functions if one.name == run.function)
+    solver = solvers(chosen.rivals, function.points)[run.who]
+    budget = min(run.evaluations or function.evaluations, function.evaluations)
+    front = solver.minimize(*function.problem(), evaluations=budget, seed=run.seed, progress=False)
+    if front.stats["stopped"] == "interrupted":
+        raise Stopped("interrupted")
+    return Found(front.F, front.stats["evaluations"], front.stats["wall_time"])
+
+
+@contextmanager
+def made(runs: Sequence[Run], jobs: int) -> Iterator[Iterator[Found]]:
+    """The results of runs in their order: made when they are asked for, or by so many processes, which end with the context."""
+    if jobs == 1:
+        yield map(searched, runs)
+        return
+    with get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        yield pool.imap(searched, runs)
+
+
+def compared(function: Function, fronts: dict[str, list[Found]]) -> list[Row]:
     """The rows of a function from its fronts, one for each seed that all solvers have finished; none if there is no such seed."""
     count = min(len(found) for found in fronts.values())
     if not count:
@@ -94,7 +135,7 @@ def compared(function: Function, fronts: dict[str, list[Front]]) -> list[Row]:
     for who, found in fronts.items():
         row = Row(function.name, who)
         for front in found[:count]:
-            own: dict[str, float] = {"evaluations": front.stats["evaluations"], "points": len(front), "seconds": front.stats["wall_time"]}
+            own: dict[str, float] = {"evaluations": front.evaluations, "points": len(front), "seconds": front.seconds}
             own["volume"] = hypervolume(front.F, truth) if truth is not None and len(front) else 0.0
             if function.front and truth is not None:
                 raw = function.name.startswith("UF")
