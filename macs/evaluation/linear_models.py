@@ -53,9 +53,12 @@ class Samples:
         return f"<Samples: {len(self)} with {self.residuals.shape[1]} residuals>"
 
     def joined(self, X: np.ndarray, residuals: np.ndarray) -> Self:
-        """The last of these points and of others, at most `MEMORY`."""
+        """The last of these points and of others, at most `MEMORY`. Raises ValueError if the others have another number of residuals."""
         if not len(self):
             return type(self)(X[-MEMORY:], residuals[-MEMORY:])
+        known, count = self.residuals.shape[1], residuals.shape[1]
+        if count != known:
+            raise ValueError(f"constraints: the function returned {count} of them, {known} before")
         return type(self)(np.vstack([self.X, X])[-MEMORY:], np.vstack([self.residuals, residuals])[-MEMORY:])
 
 
@@ -74,9 +77,9 @@ def steps_to_zero(box: Box, X: np.ndarray, residuals: np.ndarray, samples: Sampl
         violated = np.flatnonzero(residuals[row])
         if len(near) and len(violated):
             apart, amount = np.sqrt(squared[row, near]), residuals[row, violated]
-            change = samples.residuals[near][:, violated] - amount
-            slopes = _gradients(box.difference(samples.X[near], X[row]), change, apart)
-            step = _step(box, X[row], amount, slopes)
+            with np.errstate(over="ignore", invalid="ignore"):  # a slope that is no finite number is left out
+                slopes = _gradients(box.difference(samples.X[near], X[row]), samples.residuals[near][:, violated] - amount, apart)
+                step = _step(box, X[row], amount, slopes)
             steps[row] = step * min(1.0, apart.max() / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
     return steps
 
@@ -90,7 +93,7 @@ def _step(box: Box, x: np.ndarray, amount: np.ndarray, gradients: np.ndarray) ->
     """The shortest step (d,) from x (d,) by which residuals `amount` (c,) with these gradients (c, d) vanish; variables that it would move
     beyond a bound stay there, and the others do more."""
     sizes = np.linalg.norm(gradients, axis=1)
-    known = sizes > 0.0
+    known = np.isfinite(sizes) & (sizes > 0.0)
     directions, wanted = gradients[known] / sizes[known, None], -(1.0 + BEYOND) * amount[known] / sizes[known]
     step, free = np.zeros(len(x)), np.ones(len(x), dtype=bool)
     while len(wanted) and free.any():
