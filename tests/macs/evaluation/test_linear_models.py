@@ -57,6 +57,14 @@ def test_what_no_point_of_the_box_can_meet_ends_at_its_corner():
     assert x + step == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
+def test_constraints_that_say_nearly_the_same_do_not_drive_a_step_far():
+    """x1 = 0.4 and x1 + 1e-6 x2 = 0.41 are both zero at x2 = 10,000 only: the step ends between the two planes."""
+    rng, x = np.random.default_rng(1), np.array([0.5, 0.5])
+    A, b = np.array([[1.0, 0.0], [1.0, 1e-6]]), np.array([0.4, 0.41])
+    step = steps_to_zero(box(2), x[None], (A @ x - b)[None], around(x, 0.4, 6, lambda X: X @ A.T - b, rng))[0]
+    assert step == pytest.approx([-0.095 * (1.0 + BEYOND), 0.0], abs=1e-6)
+
+
 def test_steps_take_the_shorter_way_around():
     x = np.array([0.98, 0.5])
     X = np.array([[0.02, 0.5], [0.96, 0.5], [0.98, 0.6]])

@@ -138,6 +138,17 @@ def test_a_function_that_returns_another_number_of_constraints_is_refused():
         MACS().minimize(function, [(0.0, 2.0)] * 2, evaluations=300, seed=1, progress=False)
 
 
+def test_a_point_whose_violation_a_step_does_not_halve_is_given_up():
+    """The violation, one and the distance of x1 from 1, is nowhere less than one."""
+    evaluator = boxed(lambda X: (X, 1.0 + np.abs(X[:, :1] - 1.0)), [(0.0, 2.0)] * 2)
+    state, trials = state_of(evaluator)
+    seen = evaluator.evaluate(np.array([[1.5, 1.0]]))
+    before = state.evaluations = evaluator.counts.evaluations
+    state.samples = state.samples.joined(np.array([[0.8, 0.5], [0.75, 0.6], [0.9, 0.4]]), 1.0 + np.array([[0.6], [0.5], [0.8]]))
+    restoration.restore(trials, [seen])
+    assert evaluator.counts.evaluations == before + 1
+
+
 def state_of(evaluator):
     state = MACS().begin(evaluator, 100, np.random.default_rng(1))
     return state, Trials(MACS(), state, evaluator, 100)
