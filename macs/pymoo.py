@@ -338,18 +338,18 @@ class Told(BlackBox):
         more: Callable[[np.ndarray], Population] | None,
         known: dict[bytes, Any],
     ) -> None:
-        super().__init__(replace(problem, rows=self._rows), tolerance=0.0)
+        super().__init__(problem, tolerance=0.0)
         self.known = dict(known)
         self._told, self._more = iter(tuple(told)), more
 
-    def _rows(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _values(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         batch = next(self._told, None)
         if batch is None:
             if self._more is None:
-                raise Asked(X)
-            batch = self._more(X)
+                raise Asked(Z)
+            batch = self._more(Z)
         self._batch = batch
-        return _columns(batch.get("F"), len(X)), _residuals(batch)
+        return _columns(batch.get("F"), len(Z)), _residuals(batch)
 
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         evaluation, iterations = super()._evaluate(Z, way)

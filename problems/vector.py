@@ -122,6 +122,7 @@ class CompiledVectorProblem:
         rng = np.random.default_rng(0)
         lower, upper = (np.array([getattr(v, side) for v in self.variables]) for side in ("lower", "upper"))
         values = np.hstack(self.rows(rng.uniform(lower, upper, (FINGERPRINT_ROWS, len(lower)))))
-        digest = hashlib.sha256(repr(("vector", self.name, self.variables, self.goals, self.limits)).encode())
+        told = ("vector", self.name, self.variables, self.goals, self.limits, *([self.equalities] if self.equalities else []))
+        digest = hashlib.sha256(repr(told).encode())
         digest.update(" ".join(f"{value + 0.0:.8e}" if math.isfinite(value) else "not finite" for value in values.ravel()).encode())
         return digest.hexdigest()[:32]

@@ -68,8 +68,12 @@ class BlackBox(Evaluator):
         """The candidates (k, d) themselves: all variables of a black box are free."""
         return np.array(candidates, dtype=float)
 
+    def _values(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See `CompiledVectorProblem.evaluate`."""
+        return self.problem.evaluate(Z)
+
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
-        F, residuals = self.problem.evaluate(Z)
+        F, residuals = self._values(Z)
         self.m_known = learned(self.m_known, F.shape[1], f"function returned {F.shape[1]}")
         violation = np.abs(residuals).max(axis=1, initial=0.0)
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))

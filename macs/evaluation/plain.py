@@ -196,7 +196,7 @@ def _pymoo_bounds(problem: Any) -> list[tuple[float, float]]:
 
 
 def _pymoo_function(problem: Any) -> Callable[[np.ndarray], Outputs]:
-    """A pymoo Problem, vectorised or elementwise, as function that returns (F, G); of equality constraints G has the absolute values."""
+    """A pymoo Problem, vectorised or elementwise, as function that returns (F, G); the last columns of G are its equality constraints."""
 
     def function(X: np.ndarray) -> Outputs:
         out = problem.evaluate(X, return_values_of=["F", "G", "H"], return_as_dictionary=True)

@@ -25,15 +25,15 @@ STEPS = 6
 """Most steps of a point in an iteration."""
 LOWER = 0.5
 """Another step is made only if the last one has lowered the violation to this part."""
-PART = 4
-"""At most this part, one fourth, of the points evaluated in an iteration are restored in it."""
+PART = 0.25
+"""At most this part of the points evaluated in an iteration are restored in it."""
 
 
 def restore(trials: Trials, seen: Sequence[Evaluation]) -> None:
     """Restore some of the points that were evaluated in this iteration, drawn from those that are infeasible and that the archive does not
     dominate; remember the residuals of all.
 
-    Their number is the ratio of two success rates, of restored and of other points, at least one. A success is to be in the archive.
+    Their number is the ratio of two success rates, of steps and of other evaluations, at least one. A success is to be in the archive.
     """
     state, evaluator, box = trials.state, trials.evaluator, trials.box
     usable = [one for one in seen if one.residuals is not None and one.residuals.shape[1]]
@@ -44,7 +44,7 @@ def restore(trials: Trials, seen: Sequence[Evaluation]) -> None:
     Z, F, violation = (np.concatenate([getattr(one, name) for one in usable]) for name in ("Z", "F", "violation"))
     residuals = np.concatenate([one.residuals for one in usable if one.residuals is not None])
     rates = success_rates(state.restored)
-    count = max(1, min(round(rates[RESTORED] / rates[OTHERS]), len(F) // PART))
+    count = max(1, min(round(rates[RESTORED] / rates[OTHERS]), int(PART * len(F))))
     rows = _promising(state, F, violation, evaluator.tolerance)
     if len(rows) > count:
         rows = state.rng.choice(rows, count, replace=False)
@@ -63,7 +63,8 @@ def restore(trials: Trials, seen: Sequence[Evaluation]) -> None:
     if len(state.archive):
         made = [(OTHERS, one) for one in usable] + [(RESTORED, one) for one in trials.seen]
         kinds = np.concatenate([np.full(len(one.F), kind) for kind, one in made])
-        state.restored = updated_credit(state.restored, kinds, state.archive.has(np.concatenate([one.F for _, one in made])))
+        kept = [(one.violation <= evaluator.tolerance) & state.archive.has(one.F) for _, one in made]
+        state.restored = updated_credit(state.restored, kinds, np.concatenate(kept))
 
 
 def _promising(state: SearchState, F: np.ndarray, violation: np.ndarray, tolerance: float) -> np.ndarray:

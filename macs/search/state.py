@@ -103,9 +103,9 @@ class SearchState:
     outside : Archive
         Infeasible points with better objectives than the archive's, see `archive.outside`; none where the inner level moves candidates.
     samples : Samples
-        The last points with the residuals of all constraints, for `restoration`; none where the inner level moves candidates.
+        The last points with the residuals of all constraints, for `restoration`; none where nothing is restored.
     restored : array (2, 2)
-        Credit of points that were restored, in the second row, and of all others.
+        Credit of steps of restoration, in the second row, and of all other evaluations.
     ideal, nadir : arrays (m,)
         Best feasible values ever evaluated; worst values in the archive. NaN as long as no point was feasible.
     directions : array (k, m)

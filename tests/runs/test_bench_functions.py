@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from multiprocessing import get_context
+
 import numpy as np
 import pytest
 from plain import dtlz, uf
@@ -166,13 +168,15 @@ def test_a_small_contest(capsys):
     assert "MW1" in text and "MISSED" not in text and all(len(line) <= 160 for line in text.splitlines())
 
 
-def test_two_processes_find_the_same():
-    alone, together = [], []
+def test_two_processes_find_the_same(monkeypatch):
+    alone, together, kinds = [], [], []
+    monkeypatch.setattr(contest, "get_context", lambda kind: kinds.append(kind) or get_context(kind))
     for rows, jobs in ((alone, 1), (together, 2)):
         Contest("zdt").bench(rows, (1, 2), 200, ("ZDT1",), jobs)
     assert [(row.who, row.values["igd"], row.values["volume"]) for row in alone] == [
         (row.who, row.values["igd"], row.values["volume"]) for row in together
     ]
+    assert kinds == ["spawn"], "processes are made for two jobs only"
 
 
 def test_ctrl_c_keeps_the_seeds_that_all_have_finished(monkeypatch):
@@ -196,11 +200,11 @@ def test_all_sets_are_kinds():
 
 def test_so_many_seeds_as_are_asked_for(monkeypatch, tmp_path, capsys):
     asked = []
-    monkeypatch.setattr(Contest, "bench", lambda self, rows, seeds, **rest: asked.append((self.name, tuple(seeds))))
+    monkeypatch.setattr(Contest, "bench", lambda self, rows, seeds, jobs: asked.append((self.name, tuple(seeds), jobs)))
     page = tmp_path / "zdt.md"
-    assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--page", str(page)]) == 0
-    assert asked == [("zdt", tuple(range(1, 11))), ("zdt", (1, 2, 3))]
-    assert "--seeds 3 " in header_of("zdt", Effort(seeds=3), page).command
+    assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--jobs", "2", "--page", str(page)]) == 0
+    assert asked == [("zdt", tuple(range(1, 11)), 1), ("zdt", (1, 2, 3), 2)]
+    assert "--seeds 3 --jobs 2 " in header_of("zdt", Effort(seeds=3, jobs=2), page).command
     for call, words in (
         (["inner", "--seeds", "2"], "'inner' has none"),
         (["zdt", "--quick", "--seeds", "2"], "--quick has one seed"),

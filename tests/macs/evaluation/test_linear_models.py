@@ -38,6 +38,7 @@ def test_constraints_without_a_residual_have_no_part():
     known = around(x, 0.1, 8, lambda X: np.column_stack([X[:, 0] - 0.4, np.maximum(X[:, 1] - 0.6, 0.0)]), rng)
     step = steps_to_zero(box(3), x[None], np.array([[0.1, 0.0]]), known)[0]
     assert step == pytest.approx([-0.1 * (1.0 + BEYOND), 0.0, 0.0], abs=1e-9)
+    assert x[0] + step[0] < 0.4 - 1e-3, "inside of the limit"
 
 
 def test_variables_at_a_bound_leave_the_rest_to_the_others():
