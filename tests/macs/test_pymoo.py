@@ -144,8 +144,9 @@ def test_known_fronts_are_found():
     x = np.linspace(0, 1, 2001)
     assert distance_to_curve(res.F, np.column_stack([x, 1 - np.sqrt(x)])).max() < 5e-3 and len(res.F) == 20
     bnh = get_problem("bnh")
-    res = minimize(bnh, MACS(archive=30), ("n_eval", 5_000), seed=1)
-    assert distance_to_curve(res.F, bnh.pareto_front()).max() < 3e-3
+    runs = [minimize(bnh, MACS(archive=30), ("n_eval", 5_000), seed=seed) for seed in (1, 2, 3)]
+    assert np.median([distance_to_curve(res.F, bnh.pareto_front()).max() for res in runs]) < 2e-3
+    res = runs[0]
     assert (res.G <= 0).all() and (res.CV == 0).all() and len(res.X) == 30 == len(res.opt)
 
 

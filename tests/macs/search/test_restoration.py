@@ -61,9 +61,9 @@ def test_published_optima_with_equalities_are_found(name, optimum, near):
     assert front.F[0, 0] == pytest.approx(optimum, rel=near)
 
 
-def test_constraints_of_unlike_scales_are_met_together(seed=1):
+def test_constraints_of_unlike_scales_are_met_together():
     """g21 has residuals from 1 to 1e6 in size: the first feasible point within 1000 evaluations, where there was none after 20,000."""
-    front = MACS().minimize(get_problem("g21"), evaluations=1000, seed=seed, progress=False)
+    front = MACS().minimize(get_problem("g21"), evaluations=1000, seed=1, progress=False)
     assert len(front) and front.violation.max() <= 1e-6
 
 
@@ -85,7 +85,7 @@ def test_a_portfolio_of_assets_that_are_independent():
 
 
 def restored(name, evaluations, seed=1):
-    """The part of the evaluations that restoration takes, and the last success rates."""
+    """The part of the evaluations that restoration takes."""
     evaluator, solver, taken = boxed(get_problem(name)), MACS(archive=30), 0
     state = solver.begin(evaluator, evaluations, np.random.default_rng(seed))
 
