@@ -92,8 +92,8 @@ def insert(
     tolerance : float
         A point with a violation of at most this is feasible.
     exponent : float, optional
-        See `energy.pair_energies`. Unless it is given, with three objectives points are left out that are not `dominance.worthwhile` where
-        there are too many, and with more than three they are chosen by `niches.best_of_niches`.
+        See `energy.pair_energies`. Unless it is given, with three and more objectives points are left out that are not
+        `dominance.worthwhile` where there are too many, and with more than three they are chosen by `niches.best_of_niches`.
     guide : Guide, optional
         See `energy.spread`, by which points are then chosen.
 
@@ -127,7 +127,7 @@ def _thinned(points: Archive, known: int, limit: int, exponent: float | None = N
     """The non-dominated points, thinned to the limit; the first are `known` already."""
     keep = np.flatnonzero(nondominated(points.F))
     even = exponent is None and guide is None
-    if len(keep) > limit and even and CURVE < points.F.shape[1] <= MANY:
+    if len(keep) > limit and even and points.F.shape[1] > CURVE:
         keep = keep[worthwhile(points.F[keep])]
     if len(keep) > limit:
         F = points.F[keep]

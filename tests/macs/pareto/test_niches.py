@@ -109,3 +109,20 @@ def test_an_archive_of_many_objectives_goes_forward_where_points_far_behind_are_
         assert len(archive) == 40
         assert not dominates(archive.F[:, None], archive.F).any()
     assert np.median(np.linalg.norm(archive.F, axis=1)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("m", [4, 5, 8])
+def test_a_point_far_behind_for_a_little_of_one_objective_leaves_a_full_archive(m):
+    near = 0.01 + sphere(m, 3)
+    best = np.full(m, 0.7)
+    best[0] = 0.009
+    far = np.full(m, 0.0105)
+    far[0], far[-1] = 0.0095, 40.0
+    F = np.vstack([near, best, far])
+    empty = Archive(np.empty((0, 1)), np.empty((0, m)), np.empty(0))
+    Z, violation = np.arange(len(F), dtype=float)[:, None], np.zeros(len(F))
+    kept = insert(empty, Z, F, violation, limit=len(near), tolerance=0.0)
+    assert far.tolist() not in kept.F.tolist()
+    assert kept.F.min(axis=0).tolist() == F.min(axis=0).tolist()
+    everything = insert(empty, Z, F, violation, limit=len(F), tolerance=0.0)
+    assert far.tolist() in everything.F.tolist()  # no point dominates it
