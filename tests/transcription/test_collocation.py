@@ -477,7 +477,9 @@ def test_edges_move_to_the_switches():
     coarse = optimize(load("goddard"), Collocation(4, 4), objective="flight time", verify=None, starts=1)
     (point,) = coarse.alone().refine_mesh(tolerance=1e-8)
     assert from_dict(point.transcription).mesh_of("ascent").moving and point.simulate().max_defect < 1e-8
-    assert point.objectives["flight time"] == pytest.approx(109.10894511799619, rel=1e-9)
+    # As accurate as it is asked to be: IPOPT's barrier leaves controls 1e-5 off their bounds, how far differs between machines. Meshes
+    # whose edges stay end 2e-5 away.
+    assert point.objectives["flight time"] == pytest.approx(109.10894511799619, rel=1e-8)
 
 
 def test_a_trajectory_of_another_method_is_interpolated():
