@@ -109,6 +109,7 @@ class MACS(Settings, Solver):
             credit=no_credit(len(OPERATORS)),
             samples=Samples.none(len(evaluator.free)),
             restored=no_credit(2),
+            progress=np.zeros((2, 2)),
             effort=no_effort(len(evaluator.ways), ITERATIONS * Z.shape[1]) if gradients else no_effort(0, 0),
             iteration=0,
             evaluations=evaluator.counts.evaluations,

@@ -112,11 +112,11 @@ class Settings:
         nothing is feasible the least violated points, as many as the archive may have, stand for it, unless `breeding` is 0. An iteration
         takes at most an eighth of the budget for it.
     lone : int, optional
-        Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead; in an
-        iteration as many of them act as there are `agents`. So they
-        reach parts of the front that the archive, which keeps what is non-dominated at the moment, has lost. Default: one for each 6000
-        evaluations of the budget beyond 30 000, at most half as many as the points of `archive` beyond 10, and none with more than three
-        objectives. 0 in the paper. There are never more agents than points in the first population.
+        Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead. So they
+        reach parts of the front that the archive, which keeps what is non-dominated at the moment, has lost. In an iteration as many of
+        them act as there are `agents`, as long as they gain as much in an evaluation; the less they gain, the rarer. Default: one for each
+        6000 evaluations of the budget beyond 30 000, at most half as many as the points of `archive` beyond 10, and none with more than
+        three objectives. 0 in the paper. There are never more agents than points in the first population.
     directions : int, optional
         Number of directions that those of the agents are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
     redraw : bool, default True

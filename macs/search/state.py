@@ -106,6 +106,10 @@ class SearchState:
         The last points with the residuals of all constraints, for `restoration`; none where nothing is restored.
     restored : array (2, 2)
         Credit of steps of restoration, in the second row, and of all other evaluations.
+    progress : array (2, 2)
+        What agents with a direction, and lone ones in the second row, have gained, and in how many evaluations; older ones count less.
+    ahead : float
+        Evaluations that lone agents have had beyond their share, at least 0.
     ideal, nadir : arrays (m,)
         Best feasible values ever evaluated; worst values in the archive. NaN as long as no point was feasible.
     directions : array (k, m)
@@ -139,8 +143,8 @@ class SearchState:
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
-        "ideal": "m", "nadir": "m", "directions": "k m", "experience": "e d", "credit": "o 2", "restored": "2 2", "effort": "w 4",
-        "alike": "m bool", "in_vain": "v 2m",
+        "ideal": "m", "nadir": "m", "directions": "k m", "experience": "e d", "credit": "o 2", "restored": "2 2",
+        "progress": "2 2", "effort": "w 4", "alike": "m bool", "in_vain": "v 2m",
     }  # fmt: skip
     INDICES: ClassVar[dict[str, str]] = {"agents.direction": "directions"}
 
@@ -150,6 +154,7 @@ class SearchState:
     outside: Archive
     samples: Samples
     restored: np.ndarray
+    progress: np.ndarray
     ideal: np.ndarray
     nadir: np.ndarray
     directions: np.ndarray
@@ -168,6 +173,7 @@ class SearchState:
     polished: Archive | None = None
     in_vain: np.ndarray | None = None
     rounds: Rounds | None = None
+    ahead: float = 0.0
 
     @property
     def parents(self) -> Archive:

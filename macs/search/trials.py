@@ -37,6 +37,10 @@ class Trials:
         All results.
     credited : array (n,) of bool
         Agents with a success that is due to their own step, not to the inner level that moved the candidate elsewhere.
+    gained : array (n,)
+        By how much each agent has improved by proposals that dominate it, in ranges of the front.
+    tried : array (n,) of int
+        Number of proposals of each agent that were evaluated.
     """
 
     def __init__(self, settings: Settings, state: SearchState, evaluator: Evaluator, budget: int) -> None:
@@ -47,6 +51,7 @@ class Trials:
         self._gains = Gains(state, evaluator.tolerance)
         self._every = settings.polish_every if settings.refines and evaluator.has_gradients else None
         self.credited = np.zeros(len(state.agents), dtype=bool)
+        self.gained, self.tried = np.zeros(len(state.agents)), np.zeros(len(state.agents), dtype=int)
 
     def positions(self, rows: np.ndarray | None = None) -> np.ndarray:
         """Unit coordinates (k, d) of the agents `rows`, or of all agents."""
@@ -93,6 +98,8 @@ class Trials:
         agents, free = self.state.agents, self.evaluator.free
         improved = constrained_dominates(result.F, result.violation, agents.F[rows], agents.violation[rows], self.evaluator.tolerance)
         better = improved | self._serves_direction(rows, result)
+        self.tried[rows] += 1
+        self.gained[rows[improved]] += self._improvement(rows[improved], result.take(np.flatnonzero(improved)))
         proposed = self.box.difference(trial, X)
         achieved = self.box.difference(self.box.to_unit(result.Z[:, free]), X)
         self.credited[rows] |= better & ((proposed * achieved).sum(axis=1) >= CREDIT * (proposed**2).sum(axis=1))
@@ -102,6 +109,16 @@ class Trials:
         self.state.experience = np.vstack([self.state.experience, achieved[improved]])[-self.settings.memory :]
         success[moved] = better
         return success
+
+    def _improvement(self, rows: np.ndarray, result: Evaluation) -> np.ndarray:
+        """By how much each of these results (k,) improves its agent, which it dominates: the mean over the objectives, in ranges of the
+        front, each at most 1. Of an infeasible agent it is the part of the violation that is gone."""
+        state, tolerance = self.state, self.evaluator.tolerance
+        F, violation = state.agents.F[rows], state.agents.violation[rows]
+        span = np.where(state.nadir > state.ideal, state.nadir - state.ideal, 1.0)
+        nearer = np.clip((F - result.F) / span, 0.0, 1.0).mean(axis=1)
+        left = np.where(result.violation > tolerance, result.violation, 0.0)
+        return np.where(violation > tolerance, 1.0 - left / np.maximum(violation, tolerance), nearer)
 
     def _serves_direction(self, rows: np.ndarray, result: Evaluation) -> np.ndarray:
         """Mask (k,) of the feasible results that are better than their feasible agents in the sub-problem of the agents' directions."""

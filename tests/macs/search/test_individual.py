@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -5,7 +7,17 @@ from hypothesis import strategies as st
 
 from macs.evaluation.box import Box
 from macs.pareto.directions import pair_up
-from macs.search.individual import acting_agents, coordinate_step, differential, distinct_others, inertia
+from macs.search.individual import (
+    SHORTEST,
+    account,
+    acting_agents,
+    along_archive,
+    coordinate_step,
+    differential,
+    distinct_others,
+    inertia,
+    lone_share,
+)
 from macs.search.social import current_to_rand, nearest
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -37,6 +49,7 @@ def test_every_proposal_is_in_the_box(seed, wrap):
         inertia(cube, X, velocity, rho, False, rng),
         coordinate_step(cube, X, rng.integers(d, size=k), rng.uniform(-0.5, 0.5, k)),
         differential(cube, X, donors, 0.9, 0.9, rng),
+        along_archive(cube, X, rng.random((10, d)), rng),
         current_to_rand(cube, X, rng.random((10, d)), 5, 0.9, rng),
     ]
     for trial in proposals:
@@ -129,8 +142,44 @@ def test_the_difference_of_two_agents_is_weighted_by_F():
 
 def test_as_many_lone_agents_act_as_there_are_others():
     rng = np.random.default_rng(0)
-    assert acting_agents(10, 10, rng).tolist() == list(range(10)) and acting_agents(20, 10, rng).tolist() == list(range(20))
+    assert acting_agents(10, 10, 0.0, rng).tolist() == list(range(10)) and acting_agents(20, 10, 0.0, rng).tolist() == list(range(20))
     assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state, "nothing is drawn where all act"
-    drawn = [acting_agents(55, 10, rng) for _ in range(200)]
+    drawn = [acting_agents(55, 10, 0.0, rng) for _ in range(200)]
     assert all(rows.tolist() == sorted(set(rows)) and len(rows) == 20 and rows[:10].tolist() == list(range(10)) for rows in drawn)
     assert set(np.concatenate(drawn)) == set(range(55)), "each has its turn"
+
+
+def test_the_share_of_lone_agents_is_what_they_gain_of_all():
+    assert lone_share(np.zeros((2, 2))) == lone_share(np.array([[3.0, 40.0], [6.0, 80.0]])) == 0.5
+    assert lone_share(np.array([[0.0, 40.0], [1e-9, 40.0]])) == pytest.approx(0.95)
+    assert lone_share(np.array([[1e-9, 40.0], [0.0, 40.0]])) == pytest.approx(0.05)
+    assert lone_share(np.array([[1.0, 100.0], [9.0, 300.0]])) == pytest.approx(0.05 + 0.9 * 0.75)
+    assert lone_share(np.array([[1.0, 100.0], [0.0, 0.0]])) == pytest.approx(0.05), "where lone ones have not acted"
+
+
+@pytest.mark.parametrize("lone", [1e-6, 1e-3, 1.0])
+def test_lone_agents_have_their_share_of_the_evaluations(lone):
+    """Others gain 1e-3 in each of four evaluations, lone agents this much in each of sixty."""
+    rng, spent = np.random.default_rng(0), np.zeros(2)
+    state = SimpleNamespace(progress=np.zeros((2, 2)), ahead=0.0)
+    each, gains = np.where(np.arange(55) < 10, 4, 60), np.where(np.arange(55) < 10, 1e-3, lone)
+    for _ in range(4000):
+        acting = np.isin(np.arange(55), acting_agents(55, 10, state.ahead, rng))
+        tried = np.where(acting, each, 0)
+        account(state, gains * tried, tried, 10)
+        spent += [tried[:10].sum(), tried[10:].sum()]
+    assert spent[1] / spent.sum() == pytest.approx(0.05 + 0.9 * lone / (lone + 1e-3), abs=0.02)
+
+
+@given(SEEDS)
+def test_lone_agents_go_along_differences_of_the_archive(seed):
+    rng, cube = np.random.default_rng(seed), box(3)
+    archive, X = rng.uniform(0.4, 0.6, (3, 3)), rng.uniform(0.4, 0.6, (50, 3))
+    steps = along_archive(cube, X, archive, rng) - X
+    differences = np.array([archive[i] - archive[j] for i in range(3) for j in range(3) if i != j])
+    part = (steps @ differences.T) / (differences**2).sum(axis=1)
+    off = np.linalg.norm(steps[:, None] - part[:, :, None] * differences, axis=2)
+    best = np.take_along_axis(part, np.where(part > 0, off, np.inf).argmin(axis=1)[:, None], axis=1)
+    assert np.where(part > 0, off, np.inf).min(axis=1).max() < 1e-12
+    assert best.min() >= SHORTEST * (1 - 1e-9) and best.max() <= 1.0 + 1e-9
+    assert 0.01 < np.median(best) < 0.5

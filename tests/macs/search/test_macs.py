@@ -12,8 +12,10 @@ from plain import dtlz, uf, zdt
 
 from macs.baselines import NSGA3
 from macs.pareto.dominance import dominates
+from macs.search.individual import individual_actions
 from macs.search.macs import MACS
 from macs.search.state import NO_DIRECTION
+from macs.search.trials import Trials
 from problems.cases.goddard import reference
 
 
@@ -237,6 +239,30 @@ def test_lone_agents_are_as_many_as_the_budget_allows_and_are_never_moved_to_the
     last = state.agents.F[4:]
     assert (dominates(last, first) | (last == first).all(axis=1)).all(), "each is compared with itself only"
     assert (last != first).any()
+
+
+@pytest.mark.parametrize(("m", "tried"), [(2, 2), (3, 12)])
+def test_where_the_front_is_a_surface_lone_agents_try_all_coordinates(m, tried):
+    """Where nothing is better than anything, each lone agent that acts tries both sides of all six, and a difference; else of one."""
+    settings, box = MACS(agents=4, archive=m, lone=2, sample=8), boxed(lambda X: np.eye(m)[(X[:, 0] * 1e6).astype(int) % m], [(0, 1)] * 6)
+    state = settings.begin(box, 4000, np.random.default_rng(0))
+    while len(state.archive) < m or state.iteration < 5:
+        settings.advance(state, box, 4000)
+    state.ahead = 0.0
+    trials = Trials(settings, state, box, 4000)
+    state.agents.velocity[:] = 0.0
+    individual_actions(trials)
+    assert set(trials.tried[4:]) == {tried + 1}
+
+
+def test_lone_agents_get_evaluations_as_long_as_they_gain():
+    """Each comes to the front of DTLZ2, and then nothing is left for it to gain."""
+    settings, box = MACS(archive=50, lone=5), boxed(*dtlz(2, 3)[:2])
+    state, parts = settings.begin(box, 20_000, np.random.default_rng(1)), []
+    while state.evaluations < 20_000:
+        settings.advance(state, box, 20_000)
+        parts.append(state.progress[1, 1] / state.progress[:, 1].sum())
+    assert max(parts) > 0.4 and parts[-1] < 0.2
 
 
 def distances(problem, seeds, evaluations):

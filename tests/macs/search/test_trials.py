@@ -108,3 +108,19 @@ def test_a_proposal_that_is_only_as_good_for_the_direction_of_its_agent_is_no_su
     assert not trials.evaluate_and_accept(rows, X, X + np.array([[0.0, 0.1], [0.0, 0.2]])).any()
     assert np.array_equal(state.agents.Z[rows], before) and not state.agents.velocity[rows].any() and not len(state.experience)
     assert trials.evaluate_and_accept(rows, X, X + np.array([[-1e-9, 0.1], [0.0, 0.2]])).tolist() == [True, False]
+
+
+def test_what_agents_gain_is_counted_in_ranges_of_the_front():
+    """An agent at 0.8 that gets to 0.6 gains 0.2 of the first objective and 0.28 of the second; one that does not improve gains nothing."""
+    _, state, trials = prepared()
+    state.ideal, state.nadir = np.zeros(2), np.array([2.0, 0.5])
+    rows = np.array([2, 5])
+    X = trials.positions(rows)
+    trials.evaluate_and_accept(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]))
+    assert np.allclose(trials.gained[[2, 5]], [(0.2 / 2.0 + 0.28 / 0.5) / 2.0, 0.0])
+    assert trials.tried[[2, 5]].tolist() == [1, 1] and trials.tried.sum() == 2
+    state.agents.violation[2], state.agents.violation[5] = 3.0, np.inf
+    X = trials.positions(rows)
+    trials.evaluate_and_accept(rows, X, X + 0.1)
+    assert np.allclose(trials.gained[[2, 5]], [(0.2 / 2.0 + 0.28 / 0.5) / 2.0 + 1.0, 1.0]), "all of the violation is gone"
+    assert trials.tried[[2, 5]].tolist() == [2, 2]
