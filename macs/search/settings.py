@@ -21,8 +21,9 @@ SOME, GENERATION, GENERATIONS = 0.15, 1.0, 2.0
 """Defaults of `breeding`: few offspring, which leave most of the budget to the agents; one of each point; two of each."""
 FEW_POINTS = 10
 """Points of an archive up to which, by default, all agents have a direction."""
-LONG, ALONE = 30_000, 6000
-"""Budget up to which, by default, all agents have a direction; evaluations beyond it for each of which there is one without."""
+LONG, ALONE, ALONE_SURFACE = 30_000, 6000, 12_000
+"""Budget up to which, by default, all agents have a direction; evaluations beyond it for each of which there is one without, where the
+front is a curve or a surface."""
 SHARE = 8
 """Pattern search takes at most this part, one eighth, of the budget in one iteration."""
 LEAST = {"agents": 3, "archive": 1, "max_contractions": 0, "memory": 1, "refine_every": 1, "polish_every": 1, "ceiling": 1}
@@ -115,8 +116,8 @@ class Settings:
         Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead. So they
         reach parts of the front that the archive, which keeps what is non-dominated at the moment, has lost. In an iteration as many of
         them act as there are `agents`, as long as they gain as much in an evaluation; the less they gain, the rarer. Default: one for each
-        6000 evaluations of the budget beyond 30 000, at most half as many as the points of `archive` beyond 10, and none with more than
-        three objectives. 0 in the paper. There are never more agents than points in the first population.
+        6000 evaluations of the budget beyond 30 000, with three objectives 12 000, at most half as many as the points of `archive` beyond
+        10, and none with more than three objectives. 0 in the paper. There are never more agents than points in the first population.
     directions : int, optional
         Number of directions that those of the agents are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
     redraw : bool, default True
@@ -301,7 +302,9 @@ class Settings:
         """Number of agents without a direction beside `agents`, for m objectives, if the first population has points enough."""
         if self.lone is not None:
             return self.lone
-        return min(max(self.archive - FEW_POINTS, 0) // 2, max(budget - LONG, 0) // ALONE) if m <= MANY else 0
+        if m > MANY:
+            return 0
+        return min(max(self.archive - FEW_POINTS, 0) // 2, max(budget - LONG, 0) // (ALONE if m <= CURVE else ALONE_SURFACE))
 
     def coordinates_to_scan(self, d: int, archived: int, m: int, budget: int) -> int:
         """Number of the d coordinates that pattern search tries; with m = 1 objective the archive is full with one point."""

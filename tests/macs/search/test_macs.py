@@ -226,6 +226,7 @@ def test_settings_of_the_paper():
 def test_lone_agents_are_as_many_as_the_budget_allows_and_are_never_moved_to_the_archive():
     budgets = (9_999, 35_999, 36_000, 300_000, 1_000_000)
     assert [MACS(archive=100).lone_agents(2, budget) for budget in budgets] == [0, 0, 1, 45, 45]
+    assert [MACS(archive=100).lone_agents(3, budget) for budget in budgets] == [0, 0, 0, 22, 45]
     assert [MACS(archive=points).lone_agents(3, 1_000_000) for points in (3, 10, 11, 12, 150)] == [0, 0, 0, 1, 70]
     assert MACS(archive=150).lone_agents(4, 300_000) == MACS.paper(archive=100).lone_agents(2, 300_000) == 0
     settings, box = MACS(agents=4, archive=20, lone=5), boxed(schaffer, [(-2, 2)] * 3)
