@@ -117,8 +117,8 @@ class Trials:
         F, violation = state.agents.F[rows], state.agents.violation[rows]
         span = np.where(state.nadir > state.ideal, state.nadir - state.ideal, 1.0)
         nearer = np.clip((F - result.F) / span, 0.0, 1.0).mean(axis=1)
-        left = np.where(result.violation > tolerance, result.violation, 0.0)
-        return np.where(violation > tolerance, 1.0 - left / np.maximum(violation, tolerance), nearer)
+        infeasible, left = violation > tolerance, np.where(result.violation > tolerance, result.violation, 0.0)
+        return np.where(infeasible, 1.0 - np.divide(left, violation, out=np.zeros(len(rows)), where=infeasible), nearer)
 
     def _serves_direction(self, rows: np.ndarray, result: Evaluation) -> np.ndarray:
         """Mask (k,) of the feasible results that are better than their feasible agents in the sub-problem of the agents' directions."""
