@@ -4,8 +4,7 @@ The functions `inertia`, `coordinate_step`, `differential` and `along_archive` r
 positions X (k, d) in the unit box; they evaluate nothing. The proposals of all agents are evaluated together, and the agents without
 success try the next action (Ricciardi and Vasile 2015, section 3.1).
 
-Where a front is a surface, agents are too far apart for their differences to be of use. There lone agents try all coordinates, and then
-differences of points of the archive.
+Where a front is a surface, lone agents try all coordinates, and then differences of points of the archive.
 """
 
 from __future__ import annotations
