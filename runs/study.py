@@ -59,8 +59,8 @@ class Study:
     ----------
     name : str
     problems : names, Problems, or mapping
-        A name or address that `problems.load` takes, a `Problem`, several of them, or {label: one of them}. A mapping's value may also be
-        {"problem": name, ...}, the rest of which `problems.load` gets as data.
+        A name or address that `problems.load` takes, a `Problem`, a `VectorProblem`, a problem of pymoo, several of them, or
+        {label: one of them}. A mapping's value may also be {"problem": name, ...}, the rest of which `problems.load` gets as data.
     transcriptions : words, Transcriptions, or mapping, optional
         One or several, for all problems; {label: one}; or {label of a problem: one or several}, if its keys are the problems' labels.
         Default: the problem's own.

@@ -25,8 +25,9 @@ def plain_problem(
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
     senses: Sequence[str] | None = None,
+    name: str = "",
 ) -> CompiledVectorProblem:
-    """The vector problem of a plain vector function or a pymoo Problem, without a name.
+    """The vector problem of a plain vector function or a pymoo Problem.
 
     Parameters
     ----------
@@ -40,6 +41,8 @@ def plain_problem(
         Of the objectives. Default: "f1", "f2", ..., and no units.
     senses : sequence of m of "minimize" or "maximize", optional
         Default: all minimised.
+    name : str, optional
+        A front keeps it; without a name it does not say what it is of.
 
     Returns
     -------
@@ -53,11 +56,11 @@ def plain_problem(
     """
     m: int | None = None
     equalities: tuple[int, ...] = ()
-    if _is_pymoo(function):
+    if is_pymoo(function):
         equalities = tuple(range(int(function.n_ieq_constr), int(function.n_ieq_constr + function.n_eq_constr)))
         bounds = _pymoo_bounds(function) if bounds is None else bounds
         m = int(function.n_obj)
-        function = _pymoo_function(function)
+        function = PymooFunction(function)
     if not callable(function):
         raise ValueError(f"function: must be callable or a pymoo Problem, not {type(function).__name__}")
     if constraints is not None and not callable(constraints):
@@ -69,14 +72,14 @@ def plain_problem(
     given = labels["names"]
     if given and len(set(given)) < len(given):
         raise ValueError(f"names: {', '.join(given)} has a name twice")
-    for name, words in labels.items():
+    for key, words in labels.items():
         if words is not None:
-            m = learned(m, len(words), f"{name} has {len(words)}")
+            m = learned(m, len(words), f"{key} has {len(words)}")
     variables, lower, upper = read_bounds(bounds)
     sides = zip(variables, lower.tolist(), upper.tolist(), strict=True)
     return CompiledVectorProblem(
-        name="",
-        variables=tuple(Variable(name, low, high, "", high - low) for name, low, high in sides),
+        name=name,
+        variables=tuple(Variable(one, low, high, "", high - low) for one, low, high in sides),
         goals=() if m is None else default_goals(m, labels["names"], labels["units"], labels["senses"]),
         limits=None,
         rows=PlainRows(function, constraints),
@@ -181,9 +184,9 @@ def _rows(what: str, values: Any, count: int) -> np.ndarray:
     return array
 
 
-def _is_pymoo(function: Any) -> bool:
+def is_pymoo(problem: Any) -> bool:
     """Whether this is a pymoo Problem, by its attributes, without importing pymoo."""
-    return all(hasattr(function, name) for name in ("n_var", "n_obj", "xl", "xu", "evaluate"))
+    return all(hasattr(problem, name) for name in ("n_var", "n_obj", "xl", "xu", "evaluate"))
 
 
 def _pymoo_bounds(problem: Any) -> list[tuple[float, float]]:
@@ -195,14 +198,13 @@ def _pymoo_bounds(problem: Any) -> list[tuple[float, float]]:
     return list(zip(lower.tolist(), upper.tolist(), strict=True))
 
 
-def _pymoo_function(problem: Any) -> Callable[[np.ndarray], Outputs]:
+@dataclass(frozen=True)
+class PymooFunction:
     """A pymoo Problem, vectorised or elementwise, as function that returns (F, G); the last columns of G are its equality constraints."""
 
-    def function(X: np.ndarray) -> Outputs:
-        out = problem.evaluate(X, return_values_of=["F", "G", "H"], return_as_dictionary=True)
-        inequality, equality = out.get("G"), out.get("H")
-        columns = [] if inequality is None or not np.size(inequality) else [inequality]
-        columns += [] if equality is None or not np.size(equality) else [equality]
-        return (out["F"], np.hstack(columns)) if columns else out["F"]
+    problem: Any
 
-    return function
+    def __call__(self, X: np.ndarray) -> Outputs:
+        out = self.problem.evaluate(X, return_values_of=["F", "G", "H"], return_as_dictionary=True)
+        columns = [out[key] for key in ("G", "H") if out.get(key) is not None and np.size(out[key])]
+        return (out["F"], np.hstack(columns)) if columns else out["F"]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from macs.evaluation.plain import PymooFunction, is_pymoo, plain_problem
 from macs.io.text import call
 from macs.refinement.search_mesh import default_transcription
 from macs.search.rounds import PLANNED
@@ -149,7 +150,9 @@ def _label(one: Any) -> str:
     if isinstance(one, Transcription):
         about = one.to_dict()
         return word(one) or call(about["method"], about["settings"])
-    return type(one).__name__.lower() if isinstance(one, Solver) else one.name if isinstance(one, STATEMENTS) else str(one)
+    if isinstance(one, STATEMENTS) or is_pymoo(one):
+        return type(one).__name__ if is_pymoo(one) else one.name
+    return type(one).__name__.lower() if isinstance(one, Solver) else str(one)
 
 
 def _problem(label: str, given: Any) -> Statement:
@@ -157,8 +160,13 @@ def _problem(label: str, given: Any) -> Statement:
     name = data.pop("problem", None)
     if isinstance(name, STATEMENTS) and not data:
         return name
+    if is_pymoo(name) and not data:
+        with errors_begin_with(f"problems: '{label}'"):
+            return plain_problem(name, name=label)
     if not isinstance(name, str):
-        raise ValueError(f"problems: '{label}' must be a name, a Problem, or a table with its name as problem = ..., not {given!r}")
+        raise ValueError(
+            f"problems: '{label}' must be a name, a Problem, one of pymoo, or a table with its name as problem = ..., not {given!r}"
+        )
     with errors_begin_with("problems", anything=f"'{name}' does not load"):
         return load(name, **data)
 
@@ -227,7 +235,7 @@ def _by_problem(key: str, given: Any, problems: Mapping[str, Statement], own: Ca
         found = {}
         for label, problem in problems.items():
             if isinstance(problem, CompiledProblem | CompiledVectorProblem):
-                raise ValueError(f"{key}: problem '{label}' is compiled and has none of its own: state them")
+                raise ValueError(f"{key}: problem '{label}' has none of its own: state them")
             found[label] = own(problem)
         return found
     if not isinstance(given, Mapping):
@@ -245,6 +253,7 @@ def _pickled(place: str, *parts: Any) -> bytes:
     """Bytes that another process can make the same of: one thing, or a tuple of several."""
     for one in parts:
         function = getattr(getattr(one, "rows", None), "function", None)
+        function = type(function.problem) if isinstance(function, PymooFunction) else function
         name = type(one).__name__ if type(one).__module__ == "__main__" else getattr(function, "__name__", "the function")
         if "__main__" in (type(one).__module__, getattr(function, "__module__", "")):
             raise ValueError(f"{place}: other processes cannot import {name} from a script; put it into a module of its own")

@@ -2,7 +2,7 @@
 meshes by a density in `density`; transcriptions in `methods`; populations simulated in one call in `population`; searches in `search`,
 batches of them in `study`; published optima in `standard`; one optimum beside other programs in `peers`."""
 
-from .command import KINDS, PARALLEL, SEEDED, bench
+from .command import KINDS, SEEDED, STUDIES, bench
 from .page import Effort, header_of, sources
 
-__all__ = ["KINDS", "PARALLEL", "SEEDED", "Effort", "bench", "header_of", "sources"]
+__all__ = ["KINDS", "SEEDED", "STUDIES", "Effort", "bench", "header_of", "sources"]

@@ -34,8 +34,8 @@ KINDS = tuple(sorted(BENCHMARKS))
 SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
 SEEDED = (*functions.NAMES, "prefer", "search")
 """Benchmarks that are repeated with other seeds."""
-PARALLEL = functions.NAMES
-"""Benchmarks whose runs may be made at the same time."""
+STUDIES = functions.NAMES
+"""Benchmarks whose runs may be made at the same time, and kept."""
 
 
 def bench(kinds: Sequence[str], effort: Effort, path: str | None, page: str | None = None) -> bool:
@@ -59,7 +59,8 @@ def bench(kinds: Sequence[str], effort: Effort, path: str | None, page: str | No
                 print(f"page in {page}")
             missed += [f"{kind}: {one.what}" for one in BENCHMARKS[kind].targets(rows) if not one.met]
         if ended:
-            print("interrupted: these are the values measured until then", file=sys.stderr)
+            kept = f"; the same command goes on with the searches in {effort.keep}" if effort.keep and kind in STUDIES else ""
+            print(f"interrupted: these are the values measured until then{kept}", file=sys.stderr)
             break
     if path:
         save(path, measured)
@@ -75,9 +76,9 @@ def _run(kind: str, rows: list[Row], effort: Effort) -> bool:
     seeds = tuple(range(1, count + 1)) if count else QUICK_SEEDS if quick else SEEDS
     cases = [case for case in inner.INNER if case.quick or not quick]
     sets = {name: BENCHMARKS[name] for name in functions.NAMES}
-    drawn = seeds if count else functions.SEEDS
+    whole = {"seeds": count or functions.SEEDS, "jobs": effort.jobs, "keep": effort.keep}
     work: dict[str, Callable[[], None]] = {
-        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows, drawn, jobs=effort.jobs)) for name, one in sets.items()},
+        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows, **whole)) for name, one in sets.items()},
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
         "front": lambda: fronts.bench_fronts(rows, fronts.QUICK if quick else fronts.Effort()),
         "generation": lambda: generation.bench_generation(rows, generation.QUICK if quick else generation.FULL),

@@ -44,15 +44,18 @@ class Effort:
         Seeds 1 to this number, for the benchmarks that have seeds.
     jobs : int
         Runs that are made at the same time, on plain functions.
+    keep : str, optional
+        Folder of the runs on plain functions: those that are in it are not made again.
     """
 
     quick: bool = False
     seeds: int | None = None
     jobs: int = 1
+    keep: str | None = None
 
     @property
     def words(self) -> list[str]:
-        """The options, but for defaults."""
+        """The options that decide what is measured, but for defaults."""
         counts = {"--seeds": self.seeds, "--jobs": self.jobs if self.jobs > 1 else None}
         return [*(["--quick"] if self.quick else []), *(word for name, count in counts.items() if count for word in (name, str(count)))]
 

@@ -167,9 +167,10 @@ def bench(arguments: Namespace) -> int:
             raise WrongCall("--seeds: --quick has one seed")
         if arguments.what and kinds[0] not in benchmarks.SEEDED:
             raise WrongCall(f"--seeds: '{kinds[0]}' has none; those with seeds are {', '.join(sorted(benchmarks.SEEDED))}")
-    if arguments.jobs > 1 and (arguments.quick or (arguments.what and kinds[0] not in benchmarks.PARALLEL)):
-        raise WrongCall(f"--jobs: searches on plain functions can be made side by side ({', '.join(benchmarks.PARALLEL)}), without --quick")
-    effort = benchmarks.Effort(arguments.quick, arguments.seeds, arguments.jobs)
+    for option, given in (("jobs", arguments.jobs > 1), ("keep", arguments.keep)):
+        if given and (arguments.quick or (arguments.what and kinds[0] not in benchmarks.STUDIES)):
+            raise WrongCall(f"--{option}: is for searches on plain functions ({', '.join(benchmarks.STUDIES)}), without --quick")
+    effort = benchmarks.Effort(arguments.quick, arguments.seeds, arguments.jobs, arguments.keep)
     if arguments.page:
         if not arguments.what:
             raise WrongCall("--page: of which one? a page is of a single benchmark")

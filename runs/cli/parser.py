@@ -329,6 +329,11 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
         default=1,
         help="runs at the same time, on plain functions: results are the same, but times are no longer those of a machine of its own",
     )
+    bench.add_argument(
+        "--keep",
+        metavar="DIR",
+        help="keep searches on plain functions in DIR: killed, or with more --seeds, the same command makes only those that are missing",
+    )
     bench.add_argument("--csv", metavar="FILE", help="write the measured values to a file too, one number a line")
     bench.add_argument("--page", metavar="FILE.md", help="write the report of a single one as a page too, with the command that made it")
 

@@ -75,9 +75,9 @@ class PageHeader:
         return OPENS + "\n".join(f"{word}: {getattr(self, name)}" for name, word in NAMES.items()) + CLOSES
 
 
-def digest(*files: str | PathLike[str]) -> str:
-    """The SHA-256, in hexadecimal digits, of the content of files, one after the other. Raises OSError if one cannot be read."""
-    found = hashlib.sha256()
+def digest(*files: str | PathLike[str], text: str = "") -> str:
+    """The SHA-256, in hexadecimal digits, of a text and the content of files, one after the other. Raises OSError if one cannot be read."""
+    found = hashlib.sha256(text.encode())
     for one in files:
         found.update(read_whole(Path(one), LARGEST))
     return found.hexdigest()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from multiprocessing import get_context
+from operator import methodcaller
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from plain import dtlz, uf
 
 from macs.pareto.dominance import nondominated
 from runs.bench import Effort, command, header_of
-from runs.bench.functions import NAMES, Contest, cases, contest, judged
+from runs.bench.functions import NAMES, Contest, cases, contest, judged, searches
 from runs.bench.functions.uf import UF
 from runs.bench.measured import Row
 from runs.cli import main
@@ -158,9 +158,14 @@ def test_runs_without_a_point_are_the_worst():
     assert judged.rank(rows, rows[0], "igd") == "2" and judged.rank(rows, rows[1], "igd") == "1"
 
 
-def test_a_small_contest(capsys):
+def indicators(rows: list[Row]) -> list[tuple]:
+    """What is measured but times."""
+    return [(row.case, row.who, row.values["igd"], row.values["volume"]) for row in rows]
+
+
+def test_a_small_contest():
     rows: list[Row] = []
-    Contest("constrained").bench(rows, (1, 2), 300, ("MW1",))
+    Contest("constrained").bench(rows, 2, 300, ("MW1",), jobs=2)
     assert [row.who for row in rows] == ["MACS", *cases.the_set("constrained").rivals]
     for row in rows:
         assert row.values["evaluations"] == [300.0, 300.0] and len(row.values["volume"]) == 2
@@ -168,23 +173,60 @@ def test_a_small_contest(capsys):
     assert "MW1" in text and "MISSED" not in text and all(len(line) <= 160 for line in text.splitlines())
 
 
-def test_two_processes_find_the_same(monkeypatch):
-    alone, together, kinds = [], [], []
-    monkeypatch.setattr(contest, "get_context", lambda kind: kinds.append(kind) or get_context(kind))
-    for rows, jobs in ((alone, 1), (together, 2)):
-        Contest("zdt").bench(rows, (1, 2), 200, ("ZDT1",), jobs)
-    assert [(row.who, row.values["igd"], row.values["volume"]) for row in alone] == [
-        (row.who, row.values["igd"], row.values["volume"]) for row in together
-    ]
-    assert kinds == ["spawn"], "processes are made for two jobs only"
+def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys):
+    first: list[Row] = []
+    again: list[Row] = []
+    Contest("zdt").bench(first, 1, 200, ("ZDT1",), jobs=2, keep=str(tmp_path))
+    (folder,) = tmp_path.iterdir()
+    made = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nc")}
+    assert len(made) == 1 + len(cases.the_set("zdt").rivals) and folder.name.startswith("zdt-100-")
+    assert all(len(row.values["igd"]) == 1 for row in first)
+
+    next(path for path in made if "__MACS__" in str(path)).unlink()
+    Contest("zdt").bench(again, 1, 200, ("ZDT1",), keep=str(tmp_path))
+    assert indicators(again) == indicators(first), "one process finds what two found"
+    now = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nc")}
+    assert len(now) == len(made) and sum(now[path] != made[path] for path in made) == 1, "only what was missing is made"
+
+    # Another code makes its own.
+    monkeypatch.setattr(searches, "code", lambda: "0" * searches.DIGITS)
+    monkeypatch.setattr(searches.Study, "run", lambda *arguments, **settings: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        Contest("zdt").bench([], 1, 200, ("ZDT1",), keep=str(tmp_path))
+    assert f"searches in {folder.name} are of other code" in capsys.readouterr().err
 
 
-def test_ctrl_c_keeps_the_seeds_that_all_have_finished(monkeypatch):
-    function = cases.zdt(1)
-    done = [contest.searched(contest.Run("zdt", function.name, who, 1, 200)) for who in ("MACS", "NSGA-II")]
-    rows = contest.compared(function, {"MACS": [done[0]] * 2, "NSGA-II": [done[1]]})
-    assert [len(row.values["igd"]) for row in rows] == [1, 1] and rows[0].of("igd") != rows[1].of("igd")
-    assert contest.compared(function, {"MACS": [done[0]], "NSGA-II": []}) == []
+def test_the_digest_is_of_the_code_that_searches(tmp_path, monkeypatch):
+    (tmp_path / "macs").mkdir()
+    module = tmp_path / "macs" / "search.py"
+    module.write_text("step = 1\n")
+    monkeypatch.setattr(searches.macs, "__file__", str(tmp_path / "macs" / "__init__.py"))
+    before = searches.code()
+    assert searches.code() == before and len(before) == searches.DIGITS
+    module.write_text("step = 2\n")
+    assert searches.code() != before
+
+
+def test_an_interrupt_keeps_the_seeds_that_all_have_finished(tmp_path):
+    """As after Ctrl-C: seed 2 of one solver is missing."""
+    functions = [cases.zdt(1)]
+    ((name, batch),) = searches.studies("zdt", ("NSGA-II",), functions, 2, 200).items()
+    searches.search(batch, tmp_path / name, 2)
+    whole = contest.compared(functions[0], searches.finished(batch, tmp_path / name)["ZDT1"])
+    next((tmp_path / name).glob("*NSGA-II*/0002.nc")).unlink()
+    rows = contest.compared(functions[0], searches.finished(batch, tmp_path / name)["ZDT1"])
+    assert [len(row.values["igd"]) for row in rows] == [1, 1] and [len(row.values["igd"]) for row in whole] == [2, 2]
+    assert [row.values["igd"][0] for row in rows] == [row.values["igd"][0] for row in whole]
+    next((tmp_path / name).glob("*MACS*/0001.nc")).unlink()
+    assert contest.compared(functions[0], searches.finished(batch, tmp_path / name)["ZDT1"]) == []
+
+
+def test_a_search_that_fails_is_no_result(tmp_path):
+    """A function of exactly so many rows as a problem's fingerprint needs."""
+    function = cases.Function("fails", lambda: (methodcaller("reshape", 8, 2), [(0, 1)] * 2), 2, 200, 100)
+    ((name, batch),) = searches.studies("zdt", (), [function], 1).items()
+    with pytest.raises(RuntimeError, match="cannot reshape"):
+        searches.search(batch, tmp_path / name, 1)
 
 
 def test_p_values_are_corrected_for_all_rivals():
@@ -200,16 +242,18 @@ def test_all_sets_are_kinds():
 
 def test_so_many_seeds_as_are_asked_for(monkeypatch, tmp_path, capsys):
     asked = []
-    monkeypatch.setattr(Contest, "bench", lambda self, rows, seeds, jobs: asked.append((self.name, tuple(seeds), jobs)))
+    monkeypatch.setattr(Contest, "bench", lambda self, rows, **whole: asked.append((self.name, *whole.values())))
     page = tmp_path / "zdt.md"
-    assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--jobs", "2", "--page", str(page)]) == 0
-    assert asked == [("zdt", tuple(range(1, 11)), 1), ("zdt", (1, 2, 3), 2)]
-    assert "--seeds 3 --jobs 2 " in header_of("zdt", Effort(seeds=3, jobs=2), page).command
+    assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--jobs", "2", "--keep", "here", "--page", str(page)]) == 0
+    assert asked == [("zdt", 10, 1, None), ("zdt", 3, 2, "here")]
+    assert "--seeds 3 --jobs 2 --page" in header_of("zdt", Effort(seeds=3, jobs=2, keep="here"), page).command
     for call, words in (
         (["inner", "--seeds", "2"], "'inner' has none"),
         (["zdt", "--quick", "--seeds", "2"], "--quick has one seed"),
         (["inner", "--jobs", "2"], "--jobs"),
         (["uf", "--quick", "--jobs", "2"], "--jobs"),
+        (["inner", "--keep", "here"], "--keep"),
+        (["uf", "--quick", "--keep", "here"], "--keep"),
     ):
         assert main(["bench", *call]) == 2
         assert words in capsys.readouterr().err

@@ -2,10 +2,13 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pymoo.core.problem import Problem
+from pymoo.problems import get_problem
 from test_study import Inline
 from vector_problems import parabolas
 
@@ -167,3 +170,40 @@ def test_options_for_trajectories_are_refused_in_one_line(options, message, tmp_
 def test_the_list_has_them(capsys):
     assert main(["list"]) == 0
     assert "welded_beam" in capsys.readouterr().out
+
+
+def test_a_study_of_problems_of_pymoo(tmp_path):
+    given = [get_problem("zdt1", n_var=3), get_problem("g6")]
+    study = Study("functions", problems=given, solvers=["macs", "nsga2"], evaluations=120, runs=1, seed=1)
+    assert [cell.problem for cell in study.cells] == ["ZDT1", "ZDT1", "G6", "G6"]
+    summary = study.run(tmp_path / "out", executor=Inline())
+    front = summary.runs[0].front
+    alone = MACS().minimize(given[0], evaluations=120, seed=front.stats["seed"])
+    assert summary.finished == 4 and np.array_equal(front.F, alone.F) and front.source.name == "ZDT1"
+    assert "hypervolume" in study.report(tmp_path / "out", figures=False).text
+    with pytest.raises(ValueError, match="contains another study"):
+        replace(study, problems=[get_problem("zdt1", n_var=3), get_problem("g4")]).run(tmp_path / "out")
+
+
+def test_problems_of_pymoo_that_studies_refuse(monkeypatch):
+    def study(**settings):
+        stated = {"problems": get_problem("zdt1"), "solvers": "macs", "evaluations": 100, "runs": 1, "seed": 1}
+        return Study("functions", **(stated | settings))
+
+    with pytest.raises(ValueError, match="problems: 'mine' must be a name, a Problem, one of pymoo"):
+        study(problems={"mine": {"problem": get_problem("zdt1"), "n_var": 3}})
+    with pytest.raises(ValueError, match="problem 'ZDT1' has none of its own"):
+        study(evaluations=None)
+    with pytest.raises(ValueError, match="problems: 'nk': bounds: pymoo problem"):
+        study(problems={"nk": Problem(n_var=2, n_obj=2)})
+    monkeypatch.setattr(Ours, "__module__", "__main__")
+    with pytest.raises(ValueError, match="cannot import Ours from a script"):
+        study(problems=Ours())
+
+
+class Ours(Problem):
+    def __init__(self):
+        super().__init__(n_var=2, n_obj=2, xl=0.0, xu=1.0)
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        out["F"] = X

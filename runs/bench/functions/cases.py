@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from macs import AGEMOEA2, CTAEA, MACS, MOEAD, NSGA2, NSGA3, RVEA, SMSEMOA, Solver
+from macs.evaluation.plain import plain_problem
 from macs.pareto.directions import simplex_lattice
+from problems.vector import CompiledVectorProblem
 
 from .uf import UF
 
@@ -46,6 +48,10 @@ class Function:
     points: int
     front: Callable[[], np.ndarray] | None = None
     distance: Callable[[np.ndarray], np.ndarray] | None = None
+
+    def stated(self) -> CompiledVectorProblem:
+        """The problem as studies take it."""
+        return plain_problem(*self.problem(), names=[f"f{k + 1}" for k in range(self.objectives)], name=self.name)
 
 
 @dataclass(frozen=True)

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 
 import numpy as np
-
-from macs.io.console import Steps
-from macs.io.interrupts import Stopped
 
 from ...measures.indicators import hypervolume, igd
 from ...measures.references import union
 from ...measures.statistics import holm, pairwise
 from ..measured import Row, Target, table, verdicts
-from .cases import OURS, Function, solvers, the_set
+from .cases import OURS, Function, the_set
 from .judged import TARGETS, columns_of
+from .searches import Fronts, finished, place, search, studies
 
-SEEDS = tuple(range(1, 11))
+SEEDS = 10
 QUICK = 1000
 """Evaluations of the quick benchmark, with one seed."""
 UNJUDGED = "Not judged: what is asked is asked of all functions with all their evaluations."
@@ -35,28 +30,36 @@ class Contest:
     name: str
 
     def bench(
-        self, rows: list[Row], seeds: Sequence[int] = SEEDS, evaluations: int | None = None, names: Sequence[str] = (), jobs: int = 1
+        self,
+        rows: list[Row],
+        seeds: int = SEEDS,
+        evaluations: int | None = None,
+        names: Sequence[str] = (),
+        jobs: int = 1,
+        keep: str | None = None,
     ) -> None:
-        """Measure; `rows` are filled as values become known, also if `Stopped` ends it. Fewer `evaluations` than the set's own, and only
-        the functions of these names, if any; so many `jobs` at the same time."""
+        """Measure; `rows` are filled at the end, also if it is an interrupt.
+
+        Fewer `evaluations` than the set's own, and only the functions of these names, if any; so many `jobs` at the same time; a folder to
+        `keep` searches in, which are not made again.
+        """
         chosen = the_set(self.name)
-        functions = [one for one in chosen.functions if not names or one.name in names]
-        contenders = (OURS, *chosen.rivals)
-        runs = [Run(self.name, one.name, who, seed, evaluations) for one in functions for seed in seeds for who in contenders]
-        with Steps(chosen.title.lower(), len(runs)) as steps, made(runs, jobs) as results:
-            for function in functions:
-                fronts: dict[str, list[Found]] = {who: [] for who in contenders}
-                try:
-                    for seed in seeds:
-                        for who in contenders:
-                            steps.begin(f"{function.name}, {who}, seed {seed}")
-                            fronts[who].append(next(results))
-                finally:
-                    rows += compared(function, fronts)
+        functions = {one.name: one for one in chosen.functions if not names or one.name in names}
+        batches = studies(self.name, chosen.rivals, list(functions.values()), seeds, evaluations)
+        with place(keep) as folder:
+            try:
+                for name, batch in batches.items():
+                    search(batch, folder / name, jobs)
+            finally:
+                fronts: dict[str, Fronts] = {}
+                for name, batch in batches.items():
+                    fronts |= finished(batch, folder / name) if (folder / name).exists() else {}
+                for one in functions:
+                    rows += compared(functions[one], fronts.get(one, {}))
 
     def quick(self, rows: list[Row]) -> None:
         """One seed and few evaluations of some functions."""
-        self.bench(rows, (1,), QUICK, the_set(self.name).quick)
+        self.bench(rows, 1, QUICK, the_set(self.name).quick)
 
     def targets(self, rows: Sequence[Row]) -> list[Target]:
         """What is asked of this set; nothing if there were fewer evaluations than it is asked of."""
@@ -79,64 +82,22 @@ class Contest:
         return "\n".join(lines)
 
 
-@dataclass(frozen=True)
-class Run:
-    """One search: of the set with this name, a function, a solver and a seed, with so many evaluations if they are fewer than its own."""
-
-    set: str
-    function: str
-    who: str
-    seed: int
-    evaluations: int | None
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a search has found: objectives F (k, m), its evaluations and its seconds."""
-
-    F: np.ndarray
-    evaluations: int
-    seconds: float
-
-    def __len__(self) -> int:
-        return len(self.F)
-
-
-def searched(run: Run) -> Found:
-    """The result of a run. Raises `Stopped` if Ctrl-C ended it."""
-    chosen = the_set(run.set)
-    function = next(one for one in chosen.functions if one.name == run.function)
-    solver = solvers(chosen.rivals, function.points)[run.who]
-    budget = min(run.evaluations or function.evaluations, function.evaluations)
-    front = solver.minimize(*function.problem(), evaluations=budget, seed=run.seed, progress=False)
-    if front.stats["stopped"] == "interrupted":
-        raise Stopped("interrupted")
-    return Found(front.F, front.stats["evaluations"], front.stats["wall_time"])
-
-
-@contextmanager
-def made(runs: Sequence[Run], jobs: int) -> Iterator[Iterator[Found]]:
-    """The results of runs in their order: made when they are asked for, or by so many processes, which end with the context."""
-    if jobs == 1:
-        yield map(searched, runs)
-        return
-    with get_context("spawn").Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        yield pool.imap(searched, runs)
-
-
-def compared(function: Function, fronts: dict[str, list[Found]]) -> list[Row]:
-    """The rows of a function from its fronts, one for each seed that all solvers have finished; none if there is no such seed."""
-    count = min(len(found) for found in fronts.values())
-    if not count:
+def compared(function: Function, fronts: Fronts) -> list[Row]:
+    """The rows of a function from its fronts; none if there are none."""
+    if not any(fronts.values()):
         return []
-    known = [front.F for found in fronts.values() for front in found[:count] if len(front)]
+    known = [front.F for found in fronts.values() for front in found if len(front)]
     truth = function.front() if function.front else np.asarray(union(known)) if known else None
     rows = []
     for who, found in fronts.items():
         row = Row(function.name, who)
-        for front in found[:count]:
-            own: dict[str, float] = {"evaluations": front.evaluations, "points": len(front), "seconds": front.seconds}
-            own["volume"] = hypervolume(front.F, truth) if truth is not None and len(front) else 0.0
+        for front in found:
+            own: dict[str, float] = {
+                "evaluations": front.stats["evaluations"],
+                "points": len(front),
+                "seconds": front.stats["wall_time"],
+                "volume": hypervolume(front.F, truth) if truth is not None and len(front) else 0.0,
+            }
             if function.front and truth is not None:
                 raw = function.name.startswith("UF")
                 own["igd"] = igd(front.F, truth, normalise=not raw, curve=not raw)
