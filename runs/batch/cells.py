@@ -150,9 +150,9 @@ def _label(one: Any) -> str:
     if isinstance(one, Transcription):
         about = one.to_dict()
         return word(one) or call(about["method"], about["settings"])
-    if isinstance(one, STATEMENTS) or is_pymoo(one):
-        return type(one).__name__ if is_pymoo(one) else one.name
-    return type(one).__name__.lower() if isinstance(one, Solver) else str(one)
+    if is_pymoo(one):
+        return type(one).__name__
+    return type(one).__name__.lower() if isinstance(one, Solver) else one.name if isinstance(one, STATEMENTS) else str(one)
 
 
 def _problem(label: str, given: Any) -> Statement:
