@@ -40,14 +40,14 @@ class Reevaluation:
 def evaluated_again(problem: CompiledVectorProblem, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[dict[str, float]]]:
     """Objectives (n, m), all minimised, largest violations (n,), and violations by name of decisions (n, d), those of bounds included.
 
-    A failed evaluation has NaN and infinity.
+    A failed evaluation has NaN and infinity. Constraints without names are called g1, g2, ...
     """
-    goals, limits = problem.goals, problem.limits or ()
     if not len(Z):
-        return np.empty((0, len(goals))), np.empty(0), []
+        return np.empty((0, len(problem.goals))), np.empty(0), []
     F, found = problem.evaluate(np.array(Z, dtype=float))
     beyond = excess(np.asarray(Z, dtype=float)[:, None], problem.variables)
-    names = [*(limit.name for limit in limits), *(f"bounds of {v.name}" for v in problem.variables)]
+    limits = [f"g{k + 1}" for k in range(found.shape[1])] if problem.limits is None else [limit.name for limit in problem.limits]
+    names = [*limits, *(f"bounds of {v.name}" for v in problem.variables)]
     amounts = np.hstack([np.abs(found), beyond])
     failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(found).all(axis=1))
     F = np.where(failed[:, None], np.nan, F)

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from problems.checks import check_positive
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledProblem, Limit
 from problems.sanity import objective_spreads
 from problems.vector import CompiledVectorProblem
 from transcription.stopping import Stopped
@@ -186,7 +186,7 @@ def with_nearest(points: Kind) -> Kind:
     violations = evaluated_again(problem, nearest.decision[None])[2]
     closest = nearest.alone().replace(violations=violations)[0]
     name = max(violations[0], key=lambda name: violations[0][name])
-    limit = next(one for one in problem.limits or () if one.name == name)
+    limit = next((one for one in problem.limits or () if one.name == name), Limit(name, -np.inf, 0.0))
     before = points.message.rpartition("; ")[0]
     message = f"{before}; the nearest violates {name} by {closest.violation:.2g} of its scale, {limit.scale:g} {limit.unit}".rstrip()
     return points.replace(closest=closest, message=message, stats={**points.stats, **_more_rows(points, 1)})

@@ -173,13 +173,15 @@ def test_the_list_has_them(capsys):
 
 
 def test_a_study_of_problems_of_pymoo(tmp_path):
-    given = [get_problem("zdt1", n_var=3), get_problem("g6")]
+    given = [get_problem("zdt1", n_var=3), get_problem("bnh")]
     study = Study("functions", problems=given, solvers=["macs", "nsga2"], evaluations=120, runs=1, seed=1)
-    assert [cell.problem for cell in study.cells] == ["ZDT1", "ZDT1", "G6", "G6"]
+    assert [cell.problem for cell in study.cells] == ["ZDT1", "ZDT1", "BNH", "BNH"]
     summary = study.run(tmp_path / "out", executor=Inline())
     front = summary.runs[0].front
     alone = MACS().minimize(given[0], evaluations=120, seed=front.stats["seed"])
-    assert summary.finished == 4 and np.array_equal(front.F, alone.F) and front.source.name == "ZDT1"
+    assert summary.finished == 4 and np.array_equal(front.F, alone.F) and front.source.name == "ZDT1" and front.verified.all()
+    (constrained,) = (run.front for run in summary.runs if run.cell.labels == ("BNH", "no transcription", "macs"))
+    assert constrained.verified.all() and {"g1", "g2"} <= set(constrained.violations[0])
     assert "hypervolume" in study.report(tmp_path / "out", figures=False).text
     with pytest.raises(ValueError, match="contains another study"):
         replace(study, problems=[get_problem("zdt1", n_var=3), get_problem("g4")]).run(tmp_path / "out")

@@ -9,6 +9,7 @@ from carts import MESH, cart, constant, points, slowed
 from synthetic_fronts import black_box
 
 from macs import MACS, NSGA2, optimize
+from macs.evaluation.plain import plain_problem
 from macs.fronts import verified as module
 from macs.fronts.verified import COARSEST, FINEST, VERIFY, Simulations, accuracy, largest_miss, objective_scales, verified
 from problems import Problem
@@ -282,3 +283,12 @@ def test_the_largest_miss_is_what_is_compared_with_the_tolerance():
     assert misses == pytest.approx(np.maximum(marked.defect, marked.simulated_violation), abs=1e-8) and misses.max() > 0.1
     off = largest_miss(front.compiled(), simulations[1], front.F[1] + [0.0, 0.3 * scales[1]], scales)
     assert off == pytest.approx(max(0.3, misses[1]), abs=1e-8)
+
+
+def test_constraints_without_names_are_evaluated_again_too():
+    def problem(least: float):
+        return plain_problem(lambda X: (np.hstack([X, 1 - X]), least - X), [(0, 1)], names=["a", "b"], name="segment")
+
+    front = MACS(archive=10).solve(problem(0.5), evaluations=100, seed=1)
+    assert len(front) == 10 and front.verified.all() and all(set(found) == {"g1"} for found in front.violations)
+    assert "the nearest violates g1 by 1 of its scale" in MACS().solve(problem(2.0), evaluations=100, seed=1).message
