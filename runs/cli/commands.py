@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -177,7 +178,9 @@ def bench(arguments: Namespace) -> int:
         check_target(arguments.page)
         with wrong_call_on_value_error():
             benchmarks.header_of(kinds[0], effort, arguments.page)
-    return DONE if benchmarks.bench(kinds, effort, arguments.csv, arguments.page) else FAILED
+    # A folder that contains something else, or that another process has locked.
+    with wrong_call_on_value_error() if arguments.keep else nullcontext():
+        return DONE if benchmarks.bench(kinds, effort, arguments.csv, arguments.page) else FAILED
 
 
 # Arguments

@@ -221,6 +221,16 @@ def test_an_interrupt_keeps_the_seeds_that_all_have_finished(tmp_path):
     assert contest.compared(functions[0], searches.finished(batch, tmp_path / name)["ZDT1"]) == []
 
 
+def test_a_folder_of_other_things_is_refused(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(searches, "code", lambda: "0" * searches.DIGITS)
+    folder = tmp_path / f"zdt-100-{searches.code()}"
+    folder.mkdir()
+    (folder / "letter.txt").write_text("dear reader")
+    assert main(["bench", "zdt", "--seeds", "1", "--keep", str(tmp_path)]) == 2
+    err = capsys.readouterr().err
+    assert "contains no study but other things, 'letter.txt' for one" in err and "Traceback" not in err
+
+
 def test_a_search_that_fails_is_no_result(tmp_path):
     """A function of exactly so many rows as a problem's fingerprint needs."""
     function = cases.Function("fails", lambda: (methodcaller("reshape", 8, 2), [(0, 1)] * 2), 2, 200, 100)

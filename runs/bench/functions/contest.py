@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ...measures.indicators import hypervolume, igd
 from ...measures.references import union
 from ...measures.statistics import holm, pairwise
+from ...study import Study
 from ..measured import Row, Target, table, verdicts
 from .cases import OURS, Function, the_set
 from .judged import TARGETS, columns_of
@@ -50,12 +52,10 @@ class Contest:
             try:
                 for name, batch in batches.items():
                     search(batch, folder / name, jobs)
-            finally:
-                fronts: dict[str, Fronts] = {}
-                for name, batch in batches.items():
-                    fronts |= finished(batch, folder / name) if (folder / name).exists() else {}
-                for one in functions:
-                    rows += compared(functions[one], fronts.get(one, {}))
+            except KeyboardInterrupt:
+                rows += measured(batches, folder, functions)
+                raise
+            rows += measured(batches, folder, functions)
 
     def quick(self, rows: list[Row]) -> None:
         """One seed and few evaluations of some functions."""
@@ -80,6 +80,14 @@ class Contest:
             *(verdicts(self.targets(rows)) or [UNJUDGED]),
         ]
         return "\n".join(lines)
+
+
+def measured(batches: Mapping[str, Study], folder: Path, functions: Mapping[str, Function]) -> list[Row]:
+    """The rows of all functions from the searches that are finished."""
+    fronts: dict[str, Fronts] = {}
+    for name, batch in batches.items():
+        fronts |= finished(batch, folder / name) if (folder / name).exists() else {}
+    return [row for one in functions for row in compared(functions[one], fronts.get(one, {}))]
 
 
 def compared(function: Function, fronts: Fronts) -> list[Row]:
