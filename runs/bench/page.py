@@ -41,7 +41,7 @@ class Effort:
     ----------
     quick : bool
     seeds : int, optional
-        Seeds 1 to this number, for the benchmarks that have seeds.
+        Number of seeds, for the benchmarks that have them: 1, 2, ..., or on plain functions spawned as those of studies.
     jobs : int
         Runs that are made at the same time, on plain functions.
     keep : str, optional

@@ -320,7 +320,10 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
         "--quick", action="store_true", help="fewer cases, rounds, seeds and evaluations: all within two minutes, with more spread"
     )
     bench.add_argument(
-        "--seeds", metavar="N", type=_positive, help="seeds 1 to N, for searches (default: 10 on plain functions, 5 for prefer and search)"
+        "--seeds",
+        metavar="N",
+        type=_positive,
+        help="number of seeds of searches (default: 10 on plain functions, 5 for prefer and search)",
     )
     bench.add_argument(
         "--jobs",

@@ -188,9 +188,13 @@ def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys
     now = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nc")}
     assert len(now) == len(made) and sum(now[path] != made[path] for path in made) == 1, "only what was missing is made"
 
-    # Another code makes its own.
-    monkeypatch.setattr(searches, "code", lambda: "0" * searches.DIGITS)
+    # After Ctrl-C there is what was finished; another code makes its own.
     monkeypatch.setattr(searches.Study, "run", lambda *arguments, **settings: (_ for _ in ()).throw(KeyboardInterrupt))
+    interrupted: list[Row] = []
+    with pytest.raises(KeyboardInterrupt):
+        Contest("zdt").bench(interrupted, 1, 200, ("ZDT1",), keep=str(tmp_path))
+    assert indicators(interrupted) == indicators(first)
+    monkeypatch.setattr(searches, "code", lambda: "0" * searches.DIGITS)
     with pytest.raises(KeyboardInterrupt):
         Contest("zdt").bench([], 1, 200, ("ZDT1",), keep=str(tmp_path))
     assert f"searches in {folder.name} are of other code" in capsys.readouterr().err
@@ -200,7 +204,7 @@ def test_the_digest_is_of_the_code_that_searches(tmp_path, monkeypatch):
     (tmp_path / "macs").mkdir()
     module = tmp_path / "macs" / "search.py"
     module.write_text("step = 1\n")
-    monkeypatch.setattr(searches.macs, "__file__", str(tmp_path / "macs" / "__init__.py"))
+    monkeypatch.setattr(searches.macs, "__path__", [str(tmp_path / "macs")])
     before = searches.code()
     assert searches.code() == before and len(before) == searches.DIGITS
     module.write_text("step = 2\n")

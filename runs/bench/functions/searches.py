@@ -9,6 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import macs
+import problems
+import transcription
 from macs.front import Front
 from macs.fronts.provenance import versions
 
@@ -49,8 +51,7 @@ def studies(
 
 def code() -> str:
     """A digest of the code that searches, and of the versions of the packages it uses."""
-    root = Path(macs.__file__).parent
-    files = sorted(root.rglob("*.py"))
+    files = [one for package in (problems, transcription, macs) for one in sorted(Path(package.__path__[0]).rglob("*.py"))]
     return digest(*files, text=f"{versions()}")[:DIGITS]
 
 
