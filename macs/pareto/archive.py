@@ -8,9 +8,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..io.text import counted
-from .dominance import dominates, nondominated, worthwhile
-from .energy import Guide, spread
+from .dominance import dominates, extremes, nondominated, worthwhile
+from .energy import Guide, of_low_energy, pair_energies, reach, spread
 from .niches import MANY, best_of_niches
+from .volume import duels
 
 CURVE = 2
 """Number of objectives up to which a front is a curve. With more, points far from it can be non-dominated for ever, see `worthwhile`."""
@@ -92,8 +93,9 @@ def insert(
     tolerance : float
         A point with a violation of at most this is feasible.
     exponent : float, optional
-        See `energy.pair_energies`. Unless it is given, with three and more objectives points are left out that are not
-        `dominance.worthwhile` where there are too many, and with more than three they are chosen by `niches.best_of_niches`.
+        See `energy.pair_energies`. Unless it is given, where there are too many points: with three and more objectives those are left out
+        that are not `dominance.worthwhile`; with up to three, the others have `volume.duels` for the places of those of low energy, and
+        with more than three they are chosen by `niches.best_of_niches`.
     guide : Guide, optional
         See `energy.spread`, by which points are then chosen.
 
@@ -130,10 +132,21 @@ def _thinned(points: Archive, known: int, limit: int, exponent: float | None = N
     if len(keep) > limit and even and points.F.shape[1] > CURVE:
         keep = keep[worthwhile(points.F[keep])]
     if len(keep) > limit:
-        F = points.F[keep]
-        niches = even and F.shape[1] > MANY
-        keep = keep[best_of_niches(F, limit) if niches else spread(F, limit, keep < known, exponent, guide)]
+        F, members = points.F[keep], keep < known
+        if not even:
+            chosen = spread(F, limit, members, exponent, guide)
+        else:
+            chosen = best_of_niches(F, limit) if F.shape[1] > MANY else _even(F, limit, members)
+        keep = keep[chosen]
     return points.take(keep)
+
+
+def _even(F: np.ndarray, limit: int, members: np.ndarray) -> np.ndarray:
+    """Mask (n,) of `limit` of the points F (n, m), evenly spread and near the front; see `energy.spread` for `members`."""
+    fixed = np.zeros(len(F), dtype=bool)
+    fixed[extremes(F)[:limit]] = True
+    energies = pair_energies(F, count=limit)
+    return duels(F, of_low_energy(energies, limit, fixed, members), fixed, energies, reach(F, None))
 
 
 def least_violated(closest: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray, limit: int = 1) -> Archive:

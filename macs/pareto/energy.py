@@ -81,15 +81,21 @@ def spread(
     -------
     array (n,) of bool
     """
-    energies = pair_energies(F, exponent, limit, None if guide is None else guide.factors(F, F))
     fixed = np.zeros(len(F), dtype=bool)
     fixed[extremes(F)[:limit]] = True
     for row in [] if guide is None else guide.anchors(F):
         if np.count_nonzero(fixed) < ANCHORED * limit:
             fixed[row] = True
+    energies = pair_energies(F, exponent, limit, None if guide is None else guide.factors(F, F))
+    return of_low_energy(energies, limit, fixed, members)
+
+
+def of_low_energy(energies: np.ndarray, limit: int, fixed: np.ndarray, members: np.ndarray | None = None) -> np.ndarray:
+    """Mask (n,) of `limit` points with a low energy of all pairs (n, n), as `spread` chooses them; those of the mask `fixed` (n,) are among
+    them."""
     inside = fixed.copy() if members is None else fixed | members
     energy = energies[:, inside].sum(axis=1)
-    while np.count_nonzero(inside) > limit:  # a best point that was added replaces another
+    while np.count_nonzero(inside) > limit:  # a fixed point that was added replaces another
         _flip(inside, energy, energies, np.argmax(np.where(inside & ~fixed, energy, -np.inf)))
     while np.count_nonzero(inside) < limit:
         _flip(inside, energy, energies, np.argmin(np.where(inside, np.inf, energy)))

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from moocore import hypervolume
 
 from ..gradients.multistart import LITTLE
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import nondominated
 from ..pareto.ranges import distinct, ranges
+from ..pareto.volume import dominated_volume
 
 PLANNED = 2_000
 """Settings that follow from a number of evaluations are those of this one."""
@@ -45,8 +45,6 @@ FLAT = 1e-3
 """Least range of an objective on the front, in that of all feasible agents and points of archives: a front may be one point."""
 ALONE = 0.01
 """Least range of a single objective, in its size: its front is one point, and starts that end at one optimum have no range."""
-CORNER = 1.1
-"""Corner of the hypervolume in each objective, in ranges of the front from its ideal point."""
 DONE, CEILING = "done", "ceiling"
 """Reasons for the end: further work did not improve the front; the largest number of evaluations."""
 
@@ -192,7 +190,7 @@ def gains(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: 
         return 0.0, 0.0, 0.0
     both = np.vstack([front, new])
     before, after = (tchebycheff(F[:, None], directions, ideal, ideal + span).min(axis=0) for F in (front, both))
-    volumes = [_hypervolume((F - ideal) / span) for F in (front, both)]
+    volumes = [dominated_volume((F - ideal) / span) for F in (front, both)]
     end = float(((front.min(axis=0) - both.min(axis=0)) / span).max())
     return 1.0 - volumes[0] / volumes[1], float(np.mean(np.minimum(before - after, 1.0))), end
 
@@ -233,8 +231,3 @@ def _joined(point: np.ndarray, front: np.ndarray, alone: float) -> float:
         bounds=[(0.0, None)] * k + [(None, None)],
     )
     return min(alone, float(found.fun)) if found.status == 0 else alone
-
-
-def _hypervolume(F: np.ndarray) -> float:
-    """The volume that points F (k, m), normalised, dominate up to the corner."""
-    return float(hypervolume(np.ascontiguousarray(F), ref=np.full(F.shape[1], CORNER)))
