@@ -181,8 +181,8 @@ def test_an_unknown_method_shows_how_all_are_written(capsys):
 
 
 def test_a_search_on_shooting_is_polished_on_dfet(capsys):
-    call = ["solve", "glide.py:build", "--transcription", "shooting:6", "--polish-on", "dfet:4x3", "--seed", "1", "--out", "polished.nc"]
-    assert main(call) == 0 and "DFET" in capsys.readouterr().out
+    call = ["solve", "glide.py:build", "--transcription", "shooting:6", "--evaluations", "60", "--polish-on", "dfet:4x3", "--seed", "1"]
+    assert main([*call, "--out", "polished.nc"]) == 0 and "DFET" in capsys.readouterr().out
     assert main(["verify", "polished.nc", "--trust"]) == 0
 
 

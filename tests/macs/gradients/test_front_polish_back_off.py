@@ -57,7 +57,7 @@ def test_points_hold_at_a_price_that_is_small(rough):
     assert len(kept) == len(unchecked) and np.median(share(kept)) < 1.03
     moved = [point for point in kept if "inside its limits" in point.note]
     assert moved and all(point.optimality is None for point in moved)
-    assert kept.stats["gradient_solves"] == unchecked.stats["gradient_solves"] + len(moved), "at once"
+    assert len(moved) <= kept.stats["gradient_solves"] - unchecked.stats["gradient_solves"] <= len(kept), "each at once"
 
 
 def test_points_that_cannot_be_made_feasible_are_marked():

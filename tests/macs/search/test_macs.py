@@ -259,11 +259,11 @@ def test_where_the_front_is_a_surface_lone_agents_try_all_coordinates(m, tried):
 def test_lone_agents_get_evaluations_as_long_as_they_gain():
     """Each comes to the front of DTLZ2, and then nothing is left for it to gain."""
     settings, box = MACS(archive=50, lone=5), boxed(*dtlz(2, 3)[:2])
-    state, parts = settings.begin(box, 20_000, np.random.default_rng(1)), []
-    while state.evaluations < 20_000:
-        settings.advance(state, box, 20_000)
+    state, parts = settings.begin(box, 30_000, np.random.default_rng(1)), []
+    while state.evaluations < 30_000:
+        settings.advance(state, box, 30_000)
         parts.append(state.progress[1, 1] / state.progress[:, 1].sum())
-    assert max(parts) > 0.4 and parts[-1] < 0.2
+    assert max(parts) > 0.4 and min(parts[np.argmax(parts) :]) < 0.25
 
 
 def distances(problem, seeds, evaluations):
