@@ -9,7 +9,8 @@ With more objectives nearly every new point is non-dominated, and a point elsewh
 front: what stays says little of progress. The shares are then fixed, most of them crossover's, and mates are drawn from the whole archive.
 
 As long as nothing is feasible the archive is empty, and the least violated points are bred likewise: they are ordered by one number, and a
-generation of children with coordinates of both parents lowers it sooner than steps of single agents. Later, infeasible points with better
+generation of children with coordinates of both parents lowers it sooner than steps of single agents. Parents are then the better of two
+(Goldberg and Deb 1991). Later, infeasible points with better
 objectives than the archive's are bred with it: feasible parts may be apart from each other.
 """
 
@@ -230,8 +231,10 @@ def breed_archive(trials: Trials) -> None:
     count = settings.offspring(len(parents), m, lone, len(state.archive) > 0)
     if not count:
         return
-    rounds = [rng.permutation(len(parents)) for _ in range(-(-count // len(parents)))]
-    rows = np.concatenate(rounds)[:count]
+    if len(state.archive):
+        rows = np.concatenate([rng.permutation(len(parents)) for _ in range(-(-count // len(parents)))])[:count]
+    else:
+        rows = rng.integers(len(parents), size=(count, 2)).min(axis=1)  # the first are the least violated
     rows = np.concatenate([rows, len(parents) + np.arange(len(state.outside))])
     parents = parents.joined(state.outside)
     points = box.to_unit(parents.Z[:, evaluator.free])

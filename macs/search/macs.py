@@ -101,6 +101,7 @@ class MACS(Settings, Solver):
             agents=agents_at(seen, np.arange(0), len(evaluator.free), self),
             archive=Archive.of(seen, np.arange(0)),
             closest=Archive.of(seen, np.arange(0)),
+            breeders=Archive.of(seen, np.arange(0)),
             outside=Archive.of(seen, np.arange(0)),
             ideal=np.full(m, np.nan),
             nadir=np.full(m, np.nan),
@@ -166,7 +167,7 @@ class MACS(Settings, Solver):
         for actions in (individual_actions, social_actions):
             trials = Trials(self, state, evaluator, budget)
             actions(trials)
-            remember(state, trials.seen, self, evaluator)
+            remember(state, trials.seen, self, evaluator, bred=False)
             seen += trials.seen
         guide = guide_of(self.prefer, evaluator)
         offspring = Trials(self, state, evaluator, budget)

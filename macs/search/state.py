@@ -98,8 +98,10 @@ class SearchState:
     agents : Agents
     archive : Archive
     closest : Archive
-        The least violated points evaluated, at most as many as the archive may have, the best first, as long as no point was feasible;
-        no row once the archive has points.
+        The least violated point evaluated, as long as no point was feasible; no row once the archive has points.
+    breeders : Archive
+        The least violated of the first population and of offspring, at most as many as the archive may have, the best first, as long as no
+        point was feasible. What agents find is not among them: many points near few good ones would soon take all places.
     outside : Archive
         Infeasible points with better objectives than the archive's, see `archive.outside`; none where the inner level moves candidates.
     samples : Samples
@@ -151,6 +153,7 @@ class SearchState:
     agents: Agents
     archive: Archive
     closest: Archive
+    breeders: Archive
     outside: Archive
     samples: Samples
     restored: np.ndarray
@@ -177,8 +180,8 @@ class SearchState:
 
     @property
     def parents(self) -> Archive:
-        """The points that are bred: the archive, or the least violated points as long as it is empty."""
-        return self.archive if len(self.archive) else self.closest
+        """The points that are bred: the archive, or the breeders as long as it is empty."""
+        return self.archive if len(self.archive) else self.breeders
 
     def learn(self, optima: Archive) -> None:
         """Keep those of these optima, and of the known ones, that are non-dominated."""
@@ -190,8 +193,9 @@ class SearchState:
         return f"<SearchState: {', '.join(counted(number, what) for what, number in counts.items())}; {self.agents}, {self.archive}>"
 
 
-def remember(state: SearchState, seen: list[Evaluation], settings: Settings, evaluator: Evaluator) -> None:
-    """Offer evaluated points to the archive and update ideal and nadir; as long as none is feasible, update the least violated points."""
+def remember(state: SearchState, seen: list[Evaluation], settings: Settings, evaluator: Evaluator, bred: bool = True) -> None:
+    """Offer evaluated points to the archive and update ideal and nadir; as long as none is feasible, update the least violated point and,
+    if they are `bred`, the breeders."""
     if not seen:
         return
     Z, F = np.vstack([e.Z for e in seen]), np.vstack([e.F for e in seen])
@@ -205,11 +209,13 @@ def remember(state: SearchState, seen: list[Evaluation], settings: Settings, eva
         state.ideal = np.fmin(state.ideal, state.archive.F.min(axis=0))
         state.nadir = state.archive.F.max(axis=0)
         if settings.breeding != 0.0 and not evaluator.moves:
-            known = state.outside.joined(state.closest)
+            known = state.outside.joined(state.breeders)
             state.outside = archives.outside(known, state.archive, Z, F, violation, limit=limit, tolerance=tolerance)
-        state.closest = state.closest.take(np.arange(0))
+        state.closest, state.breeders = (one.take(np.arange(0)) for one in (state.closest, state.breeders))
         return
-    state.closest = archives.least_violated(state.closest, Z, F, violation, limit)
+    state.closest = archives.least_violated(state.closest, Z, F, violation)
+    if bred:
+        state.breeders = archives.least_violated(state.breeders, Z, F, violation, limit)
     state.hopeless += sum(e.status.tolist().count(INFEASIBLE) for e in seen if e.fallbacks)
 
 

@@ -8,7 +8,11 @@ from hypothesis import strategies as st
 
 from macs.evaluation.box import Box
 from macs.search import breeding
+from macs.search.individual import individual_actions
 from macs.search.macs import MACS
+from macs.search.social import social_actions
+from macs.search.state import remember
+from macs.search.trials import Trials
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -195,6 +199,34 @@ def test_as_long_as_nothing_is_feasible_the_least_violated_points_are_bred():
     bred, alone = (searched(MACS(archive=50, breeding=each), rippled, 20, 8000, 1) for each in (None, 0.0))
     assert len(bred.parents) == 50 and (np.diff(bred.parents.violation) >= 0.0).all()
     assert bred.closest.violation[0] < 0.5 * alone.closest.violation[0]
+
+
+def test_what_agents_find_is_not_bred_as_long_as_nothing_is_feasible():
+    solver = MACS(archive=30)
+    box = boxed(lambda X: np.column_stack([X[:, 0], -X[:, 0]]), [(0, 1)] * 20, constraints=rippled)
+    state = solver.begin(box, 5000, np.random.default_rng(1))
+    for actions in (individual_actions, social_actions):
+        trials, known = Trials(solver, state, box, 5000), state.breeders
+        actions(trials)
+        remember(state, trials.seen, solver, box, bred=False)
+        assert state.breeders is known and len(trials.seen)
+    assert state.closest.violation[0] < state.breeders.violation[0]
+
+
+def test_parents_are_the_better_of_two_as_long_as_nothing_is_feasible(monkeypatch):
+    """So that of n the i-th best is one with the probability (2 (n - i) + 1) / n^2."""
+    solver, rows = MACS(archive=20, breeding=10.0), []
+    box = boxed(lambda X: np.column_stack([X[:, 0], -X[:, 0]]), [(0, 1)] * 20, constraints=rippled)
+    state = solver.begin(box, 50_000, np.random.default_rng(1))
+    known, points = state.breeders, box.box.to_unit(state.breeders.Z)
+    breed = breeding.breed
+    monkeypatch.setattr(breeding, "breed", lambda cube, X, *rest: (rows.append(X), breed(cube, X, *rest))[1])
+    for _ in range(20):
+        state.breeders = known
+        breeding.breed_archive(Trials(solver, state, box, 50_000))
+    parents = np.vstack(rows)
+    shares = (parents[:, None] == points).all(axis=2).mean(axis=0)
+    assert np.allclose(shares, (2 * np.arange(20, 0, -1) - 1) / 400, atol=0.01)
 
 
 def apart(X: np.ndarray) -> np.ndarray:

@@ -74,15 +74,16 @@ def test_nothing_feasible_leaves_the_archive_empty_and_tells_the_closest():
     box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
     state = run(MACS(), box, 1000)
     assert len(state.archive) == 0
-    assert len(state.closest) == 10
-    assert 1.0 <= state.closest.violation[0] < 1.02 and (np.diff(state.closest.violation) >= 0.0).all()
+    assert len(state.closest) == 1 and len(state.breeders) == 10
+    assert 1.0 <= state.closest.violation[0] < 1.02 and (np.diff(state.breeders.violation) >= 0.0).all()
+    assert state.closest.violation[0] <= min(state.breeders.violation[0], state.agents.violation.min())
 
 
 def test_from_infeasible_to_feasible():
     box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: np.abs(X[:, 1:] - 0.5) - 0.05)
     state = run(MACS(), box, 1500)
     assert len(state.archive) == 10
-    assert len(state.closest) == 0
+    assert len(state.closest) == len(state.breeders) == 0
     assert (np.abs(state.archive.Z[:, 1:] - 0.5) <= 0.05 + 1e-6).all()
 
 

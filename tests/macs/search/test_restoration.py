@@ -50,7 +50,7 @@ def test_a_front_on_a_thin_feasible_set_is_covered(seed):
 def test_equalities_that_are_stated_as_a_band_of_absolute_values():
     """Their residuals have one sign on both sides, which makes models worse, not useless."""
     front = MACS(archive=30).minimize(Sphere(4, "G"), evaluations=10_000, seed=1, progress=False)
-    assert len(front) == 30 and off_the_arc(front.F)[1] < 0.5
+    assert len(front) == 30 and off_the_arc(front.F)[1] < 0.8
 
 
 @pytest.mark.parametrize(("name", "optimum", "near"), [("g5", 5126.4967, 1e-4), ("g13", 0.0539415, 1e-2), ("g15", 961.7150222899, 1e-5)])
