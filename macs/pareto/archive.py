@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..io.text import counted
-from .dominance import dominates, extremes, nondominated, worthwhile
-from .energy import Guide, of_low_energy, pair_energies, reach, spread
+from .dominance import dominates, nondominated, worthwhile
+from .energy import Guide, best_of_each, of_low_energy, pair_energies, reach, spread
 from .niches import MANY, best_of_niches
 from .volume import duels
 
@@ -143,9 +143,7 @@ def _thinned(points: Archive, known: int, limit: int, exponent: float | None = N
 
 def _even(F: np.ndarray, limit: int, members: np.ndarray) -> np.ndarray:
     """Mask (n,) of `limit` of the points F (n, m), evenly spread and near the front; see `energy.spread` for `members`."""
-    fixed = np.zeros(len(F), dtype=bool)
-    fixed[extremes(F)[:limit]] = True
-    energies = pair_energies(F, count=limit)
+    fixed, energies = best_of_each(F, limit), pair_energies(F, count=limit)
     return duels(F, of_low_energy(energies, limit, fixed, members), fixed, energies, reach(F, None))
 
 

@@ -81,13 +81,19 @@ def spread(
     -------
     array (n,) of bool
     """
-    fixed = np.zeros(len(F), dtype=bool)
-    fixed[extremes(F)[:limit]] = True
+    fixed = best_of_each(F, limit)
     for row in [] if guide is None else guide.anchors(F):
         if np.count_nonzero(fixed) < ANCHORED * limit:
             fixed[row] = True
     energies = pair_energies(F, exponent, limit, None if guide is None else guide.factors(F, F))
     return of_low_energy(energies, limit, fixed, members)
+
+
+def best_of_each(F: np.ndarray, limit: int) -> np.ndarray:
+    """Mask (n,) of the best of each objective of F (n, m); of the first `limit` objectives if these are fewer."""
+    fixed = np.zeros(len(F), dtype=bool)
+    fixed[extremes(F)[:limit]] = True
+    return fixed
 
 
 def of_low_energy(energies: np.ndarray, limit: int, fixed: np.ndarray, members: np.ndarray | None = None) -> np.ndarray:

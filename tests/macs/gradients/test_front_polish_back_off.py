@@ -49,7 +49,9 @@ def share(front: Front) -> np.ndarray:
     return simulated[:, 0] / (4 / (9 * simulated[:, 1]))
 
 
-def test_points_hold_at_a_price_that_is_small(rough):
+def test_points_hold_at_a_price_that_is_small(rough, monkeypatch):
+    solved = []
+    monkeypatch.setattr(front_polish, "back_off", lambda *arguments: (solved.append(back_off(*arguments)), solved[-1])[1])
     unchecked, kept = (rough.polished(COARSE, solves=30, verify=verify) for verify in (None, VERIFY))
     before, after = (front.simulate(tolerance=VERIFY) for front in (unchecked, kept))
     assert before.violation.max() > 10 * VERIFY and share(unchecked).min() < 0.99, "better than there is: they exceed their limits"
@@ -57,7 +59,8 @@ def test_points_hold_at_a_price_that_is_small(rough):
     assert len(kept) == len(unchecked) and np.median(share(kept)) < 1.03
     moved = [point for point in kept if "inside its limits" in point.note]
     assert moved and all(point.optimality is None for point in moved)
-    assert len(moved) <= kept.stats["gradient_solves"] - unchecked.stats["gradient_solves"] <= len(kept), "each at once"
+    again = int(solved[0][2].sum())
+    assert kept.stats["gradient_solves"] == unchecked.stats["gradient_solves"] + again and again >= len(moved), "each at once"
 
 
 def test_points_that_cannot_be_made_feasible_are_marked():

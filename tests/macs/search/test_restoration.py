@@ -49,8 +49,8 @@ def test_a_front_on_a_thin_feasible_set_is_covered(seed):
 
 def test_equalities_that_are_stated_as_a_band_of_absolute_values():
     """Their residuals have one sign on both sides, which makes models worse, not useless."""
-    front = MACS(archive=30).minimize(Sphere(4, "G"), evaluations=10_000, seed=1, progress=False)
-    assert len(front) == 30 and off_the_arc(front.F)[1] < 0.8
+    front = MACS(archive=30).minimize(Sphere(4, "G"), evaluations=20_000, seed=1, progress=False)
+    assert len(front) == 30 and off_the_arc(front.F)[1] < 0.5
 
 
 @pytest.mark.parametrize(("name", "optimum", "near"), [("g5", 5126.4967, 1e-4), ("g13", 0.0539415, 1e-2), ("g15", 961.7150222899, 1e-5)])
@@ -78,10 +78,10 @@ def test_a_portfolio_of_assets_that_are_independent():
     problem.maximize("return")
     problem.constraint("sum", lower=1.0, upper=1.0)
     problem.function(lambda X: {"variance": X**2 @ variances, "return": X @ returns, "sum": X.sum(axis=1)})
-    front = MACS(archive=20).solve(problem, evaluations=10_000, seed=1, progress=False)
+    front = MACS(archive=20).solve(problem, evaluations=20_000, seed=1, progress=False)
     assert len(front) == 20 and np.abs(front.decision.sum(axis=1) - 1.0).max() <= 1e-6
-    assert front.F[:, 0].min() == pytest.approx(1.0 / (1.0 / variances).sum(), rel=0.06)
-    assert front.F[:, 1].min() == pytest.approx(-1.0, abs=0.06)
+    assert front.F[:, 0].min() == pytest.approx(1.0 / (1.0 / variances).sum(), rel=0.03)
+    assert front.F[:, 1].min() == pytest.approx(-1.0, abs=0.01)
 
 
 def restored(name, evaluations, seed=1):
