@@ -90,3 +90,32 @@ def test_the_archive_is_nearer_to_the_front_than_that_of_energy_alone(m, power, 
             archive = insert(archive, np.zeros((60, 1)), F[rows], np.zeros(60), limit=40, tolerance=0.0, exponent=exponent)
         away[exponent] = (np.linalg.norm(archive.F, axis=1) - 1.0).mean()
     assert away[None] < part * away[power]
+
+
+def fought_by_definition(F, chosen, fixed):
+    """The same duels, with all volumes and distances computed anew for each."""
+    N = (F - F.min(axis=0)) / np.ptp(F, axis=0)
+    power, inside = {2: 2.0, 3: 8.0}[F.shape[1]], chosen.copy()
+
+    def worth(point, beside):
+        added = dominated_volume(N[[*beside, point]]) - dominated_volume(N[beside])
+        return added * (np.linalg.norm(N[beside] - N[point], axis=1) ** -power).sum() ** (-1.0 / power)
+
+    for other in np.flatnonzero(~chosen):
+        held = min(set(np.flatnonzero(inside)) - set(fixed), key=lambda one: np.linalg.norm(N[one] - N[other]))
+        beside = [one for one in np.flatnonzero(inside) if one != held]
+        if worth(other, beside) > worth(held, beside) * (1.0 + 1e-9):
+            inside[held], inside[other] = False, True
+    return inside
+
+
+@given(st.integers(2, 3), st.integers(5, 12), st.integers(0, 2**32 - 1))
+def test_places_are_those_of_the_definition(m, limit, seed):
+    rng = np.random.default_rng(seed)
+    F = behind_a_surface(rng, 60, m, 0.1)
+    F = F[nondominated(F)]
+    chosen = np.zeros(len(F), dtype=bool)
+    chosen[extremes(F)] = chosen[rng.permutation(len(F))[:limit]] = True
+    best = extremes(F)
+    if np.count_nonzero(chosen) > len(set(best)):
+        assert np.array_equal(fought(F, chosen, best), fought_by_definition(F, chosen, best))
