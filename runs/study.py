@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from macs.fronts.verified import VERIFY
 from macs.io.html import html_block, html_table
-from problems.checks import short_repr
+from problems.checks import short_repr, unknown
 from problems.compiled import Objective
 from transcription import Smooth
 
@@ -220,6 +220,7 @@ class Study:
         jobs: int = 1,
         executor: Executor | None = None,
         retry: bool = False,
+        solvers: Sequence[str] | None = None,
         progress: bool = False,
     ) -> Summary:
         """Make the runs that `out` does not have yet. Each that has begun goes on from a checkpoint of its own.
@@ -235,6 +236,8 @@ class Study:
             process for its runs, so a run that crashes or hangs ends none of the workers.
         retry : bool
             Make those runs again, too, that ended with an exception. Those that were killed or took too long always are.
+        solvers : sequence of str, optional
+            Make the runs of these only, by label. Default: of all.
         progress : bool
             Show on the terminal how it stands.
 
@@ -246,7 +249,7 @@ class Study:
         Raises
         ------
         ValueError
-            `out` contains another study, or is in use by another process.
+            The study has no such solver; `out` contains another study, or is in use by another process.
         OSError
             A run's file could not be written; those that are finished stay as they are.
         KeyboardInterrupt
@@ -255,9 +258,20 @@ class Study:
         from .batch.running import check_workers, execute
 
         check_workers(jobs, executor)
+        chosen = self.chosen(solvers)
         with Store.claim(out, self.definition()) as store:
-            execute(store, self.runs, self._task, self.objectives, jobs, executor, retry, progress)
+            execute(store, self.runs, chosen, self._task, self.objectives, jobs, executor, retry, progress)
             return store.summary(self.runs)
+
+    def chosen(self, solvers: Sequence[str] | None) -> list[str]:
+        """The labels of these solvers, or of all, each once. Raises ValueError if the study has no such solver."""
+        known = dict.fromkeys(cell.solver for cell in self.cells)
+        if isinstance(solvers, str):
+            raise ValueError(f"study '{self.name}': solvers must be a sequence of labels, not '{solvers}'")
+        for one in solvers or ():
+            if one not in known:
+                raise ValueError(f"study '{self.name}': {unknown('solver', one, known)}")
+        return [one for one in known if solvers is None or one in solvers]
 
     def status(self, out: str | PathLike[str]) -> Summary:
         """The state of the runs in `out`, with the reasons of failures. Raises ValueError if it contains another study, or none."""

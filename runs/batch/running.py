@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from pathlib import Path
 
@@ -37,6 +37,7 @@ def check_workers(jobs: int, executor: Executor | None) -> None:
 def execute(
     store: Store,
     count: int,
+    solvers: Collection[str],
     task_of: Callable[[StoredRun, Path], Task],
     goals: Mapping[str, Sequence[Objective]],
     jobs: int,
@@ -51,6 +52,8 @@ def execute(
     ----------
     store : Store
     count : int
+    solvers : collection of str
+        Labels of those whose runs are made.
     task_of : callable
         (run, path of its checkpoint) -> the task that makes it.
     goals : {problem: sequence of Objective}
@@ -59,7 +62,7 @@ def execute(
         As for `Study.run`.
     """
     # The first run of every cell comes first: a study that is stopped early has results in all cells.
-    every = sorted(store.runs(count), key=lambda run: run.number)
+    every = sorted((run for run in store.runs(count) if run.cell.solver in solvers), key=lambda run: run.number)
     todo = [run for run in every if run.status in AGAIN or (retry and run.status == CRASHED)]
     if not todo:
         return

@@ -3,6 +3,7 @@ meshes by a density in `density`; transcriptions in `methods`; populations simul
 batches of them in `study`; published optima in `standard`; one optimum beside other programs in `peers`."""
 
 from .command import KINDS, SEEDED, STUDIES, bench
+from .functions import solvers_of
 from .page import Effort, header_of, sources
 
-__all__ = ["KINDS", "SEEDED", "STUDIES", "Effort", "bench", "header_of", "sources"]
+__all__ = ["KINDS", "SEEDED", "STUDIES", "Effort", "bench", "header_of", "solvers_of", "sources"]

@@ -76,7 +76,7 @@ def _run(kind: str, rows: list[Row], effort: Effort) -> bool:
     seeds = tuple(range(1, count + 1)) if count else QUICK_SEEDS if quick else SEEDS
     cases = [case for case in inner.INNER if case.quick or not quick]
     sets = {name: BENCHMARKS[name] for name in functions.NAMES}
-    whole = {"seeds": count or functions.SEEDS, "jobs": effort.jobs, "keep": effort.keep}
+    whole = {"seeds": count or functions.SEEDS, "jobs": effort.jobs, "keep": effort.keep, "only": effort.solvers or None}
     work: dict[str, Callable[[], None]] = {
         **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows, **whole)) for name, one in sets.items()},
         "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),

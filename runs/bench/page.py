@@ -46,18 +46,25 @@ class Effort:
         Runs that are made at the same time, on plain functions.
     keep : str, optional
         Folder of the runs on plain functions: those that are in it are not made again.
+    solvers : tuple of str
+        Those that are compared on plain functions; all if there are none.
     """
 
     quick: bool = False
     seeds: int | None = None
     jobs: int = 1
     keep: str | None = None
+    solvers: tuple[str, ...] = ()
 
     @property
     def words(self) -> list[str]:
         """The options that decide what is measured, but for defaults."""
         counts = {"--seeds": self.seeds, "--jobs": self.jobs if self.jobs > 1 else None}
-        return [*(["--quick"] if self.quick else []), *(word for name, count in counts.items() if count for word in (name, str(count)))]
+        return [
+            *(["--quick"] if self.quick else []),
+            *(word for name, count in counts.items() if count for word in (name, str(count))),
+            *(["--solvers", *self.solvers] if self.solvers else []),
+        ]
 
 
 def header_of(kind: str, effort: Effort, path: str | PathLike[str]) -> PageHeader:

@@ -168,10 +168,19 @@ def bench(arguments: Namespace) -> int:
             raise WrongCall("--seeds: --quick has one seed")
         if arguments.what and kinds[0] not in benchmarks.SEEDED:
             raise WrongCall(f"--seeds: '{kinds[0]}' has none; those with seeds are {', '.join(sorted(benchmarks.SEEDED))}")
-    for option, given in (("jobs", arguments.jobs > 1), ("keep", arguments.keep)):
+    for option, given in (("jobs", arguments.jobs > 1), ("keep", arguments.keep), ("solvers", arguments.solvers)):
         if given and (arguments.quick or (arguments.what and kinds[0] not in benchmarks.STUDIES)):
             raise WrongCall(f"--{option}: is for searches on plain functions ({', '.join(benchmarks.STUDIES)}), without --quick")
-    effort = benchmarks.Effort(arguments.quick, arguments.seeds, arguments.jobs, arguments.keep)
+    chosen = tuple(dict.fromkeys(arguments.solvers or ()))
+    if chosen:
+        if not arguments.what:
+            raise WrongCall("--solvers: of which one? Sets of functions have different ones")
+        known = benchmarks.solvers_of(kinds[0])
+        for one in chosen:
+            choose(one, known, "solver")
+        if known[0] not in chosen:
+            raise WrongCall(f"--solvers: {known[0]} must be among them")
+    effort = benchmarks.Effort(arguments.quick, arguments.seeds, arguments.jobs, arguments.keep, chosen)
     if arguments.page:
         if not arguments.what:
             raise WrongCall("--page: of which one? a page is of a single benchmark")

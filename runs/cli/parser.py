@@ -274,6 +274,7 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     run.add_argument("--out", metavar="DIR", help="the study's folder (default: out/NAME)")
     run.add_argument("--runs", metavar="N", type=_positive, help="number of runs of each cell (default: the study's own)")
     run.add_argument("--jobs", metavar="N", type=_positive, help="processes of this machine that work at a time (default: 1)")
+    run.add_argument("--solvers", metavar="LABEL", nargs="+", help="make the runs of these only (default: of all)")
     run.add_argument("--dask", metavar="ADDRESS", help="work on a Dask cluster, such as tcp://10.0.0.1:8786, instead")
     run.add_argument("--retry", action="store_true", help="make runs again, too, that ended with an exception")
     run.add_argument("--quick", action="store_true", help="at most 2 runs of 500 evaluations, in a folder of their own (out/NAME-quick)")
@@ -336,6 +337,12 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
         "--keep",
         metavar="DIR",
         help="keep searches on plain functions in DIR: killed, or with more --seeds, the same command makes only those that are missing",
+    )
+    bench.add_argument(
+        "--solvers",
+        metavar="NAME",
+        nargs="+",
+        help="only these on plain functions, MACS among them (default: all of the set, which then is judged)",
     )
     bench.add_argument("--csv", metavar="FILE", help="write the measured values to a file too, one number a line")
     bench.add_argument("--page", metavar="FILE.md", help="write the report of a single one as a page too, with the command that made it")

@@ -37,7 +37,8 @@ def run(arguments: Namespace) -> int:
     again = "finished runs are kept; the same command goes on from there"
     try:
         with wrong_call_on_value_error(), cluster(arguments.dask) if arguments.dask else nullcontext() as executor:
-            summary = batch.run(out, jobs=arguments.jobs or 1, executor=executor, retry=arguments.retry, progress=True)
+            jobs, retry, solvers = arguments.jobs or 1, arguments.retry, arguments.solvers
+            summary = batch.run(out, jobs=jobs, executor=executor, retry=retry, solvers=solvers, progress=True)
     except KeyboardInterrupt:
         print(f"interrupted; {again}", file=sys.stderr)
         return INTERRUPTED
@@ -47,7 +48,8 @@ def run(arguments: Namespace) -> int:
     except OSError as error:
         raise WrongCall(f"{error.strerror or error}; {again}") from error
     print(f"{summary}\n\nin {out}")
-    return DONE if summary.finished == len(summary.runs) else FAILED
+    asked = [run for run in summary.runs if solvers is None or run.cell.solver in solvers]
+    return DONE if all(run.finished for run in asked) else FAILED
 
 
 def status(arguments: Namespace) -> int:

@@ -109,14 +109,21 @@ def rows_of(case: str, key: str, evaluations: float, **found: list[float]) -> li
     ]
 
 
+def against_all(name: str, case: str, key: str, evaluations: float, ours: list[float], theirs: list[float]) -> list[Row]:
+    """The rows of a case with all rivals of its set, which are all alike."""
+    return rows_of(case, key, evaluations, **{who: ours if who == "MACS" else theirs for who in cases.solvers_of(name)})
+
+
 def many_rows(distance: float, volume: float, good: int) -> list[Row]:
     """Of all functions; ours is behind by more than 2 % on all of five objectives but so many."""
     rows: list[Row] = []
     for i, one in enumerate(cases.the_set("many").functions):
         own = volume if one.name.startswith("DTLZ2") else 0.99 if i < good else 0.9
-        found = rows_of(one.name, "volume", 15_000, MACS=[0.0, own, 9.0], NSGA_III=[1.0], RVEA=[0.5])
-        for row, values in zip(found, ([distance * 0.1, distance, 9.0], [1.0], [2.0]), strict=True):
-            row.values["distance"] = values
+        found = against_all("many", one.name, "volume", 15_000, [0.0, own, 9.0], [0.5])
+        for row in found:
+            row.values["distance"] = [distance * 0.1, distance, 9.0] if row.who == "MACS" else [2.0]
+            if row.who == "NSGA-III":
+                row.values |= {"volume": [1.0], "distance": [1.0]}
         rows += found
     return rows
 
@@ -136,13 +143,15 @@ def test_the_best_median_is_asked_on_a_share(name, key, least, monkeypatch, caps
         rows = [
             row
             for i, one in enumerate(functions)
-            for row in rows_of(one.name, key, one.evaluations, MACS=[0.0, better if i < good else 1 / better, 9.0], NSGA_II=[1.0])
+            for row in against_all(name, one.name, key, one.evaluations, [0.0, better if i < good else 1 / better, 9.0], [1.0])
         ]
         assert [one.met for one in judged.TARGETS[name](rows)] == [good == least]
         monkeypatch.setattr(command, "_run", lambda one, found, effort, rows=rows: found.extend(rows) or False)
         assert main(["bench", name]) == (0 if good == least else 1)
         assert f"{good} of {len(functions)}" in capsys.readouterr().out
-    assert judged.TARGETS[name](rows[2:]) == [], "not all were measured"
+    several = len(cases.solvers_of(name))
+    assert judged.TARGETS[name](rows[several:]) == [], "not all functions were measured"
+    assert judged.TARGETS[name]([row for row in rows if row.who != "NSGA-II"]) == [], "not all rivals were measured"
     rows[0].values["evaluations"] = [1000.0]
     assert judged.TARGETS[name](rows) == [], "not with all evaluations"
 
@@ -198,6 +207,18 @@ def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys
     with pytest.raises(KeyboardInterrupt):
         Contest("zdt").bench([], 1, 200, ("ZDT1",), keep=str(tmp_path))
     assert f"searches in {folder.name} are of other code" in capsys.readouterr().err
+
+
+def test_only_some_solvers(tmp_path):
+    """Then nothing is judged, and a later call makes the others: the seeds are the same."""
+    alone: list[Row] = []
+    all_of_them: list[Row] = []
+    Contest("zdt").bench(alone, 2, 200, ("ZDT1",), keep=str(tmp_path), only=["MACS"])
+    assert [row.who for row in alone] == ["MACS"] and len(list(tmp_path.rglob("*.nc"))) == 2
+    text = Contest("zdt").report(alone)
+    assert contest.UNJUDGED in text and "MISSED" not in text
+    Contest("zdt").bench(all_of_them, 2, 200, ("ZDT1",), jobs=2, keep=str(tmp_path))
+    assert [row.who for row in all_of_them] == list(cases.solvers_of("zdt")) and indicators(all_of_them[:1]) == indicators(alone)
 
 
 def test_the_digest_is_of_the_code_that_searches(tmp_path, monkeypatch):
@@ -258,9 +279,11 @@ def test_so_many_seeds_as_are_asked_for(monkeypatch, tmp_path, capsys):
     asked = []
     monkeypatch.setattr(Contest, "bench", lambda self, rows, **whole: asked.append((self.name, *whole.values())))
     page = tmp_path / "zdt.md"
-    assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--jobs", "2", "--keep", "here", "--page", str(page)]) == 0
-    assert asked == [("zdt", 10, 1, None), ("zdt", 3, 2, "here")]
-    assert "--seeds 3 --jobs 2 --page" in header_of("zdt", Effort(seeds=3, jobs=2, keep="here"), page).command
+    some = ["--solvers", "NSGA-II", "MACS", "--page", str(page)]
+    assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--jobs", "2", "--keep", "here", *some]) == 0
+    assert asked == [("zdt", 10, 1, None, None), ("zdt", 3, 2, "here", ("NSGA-II", "MACS"))]
+    effort = Effort(seeds=3, jobs=2, keep="here", solvers=("MACS", "MOEA/D"))
+    assert "--seeds 3 --jobs 2 --solvers MACS MOEA/D --page" in header_of("zdt", effort, page).command
     for call, words in (
         (["inner", "--seeds", "2"], "'inner' has none"),
         (["zdt", "--quick", "--seeds", "2"], "--quick has one seed"),
@@ -268,6 +291,11 @@ def test_so_many_seeds_as_are_asked_for(monkeypatch, tmp_path, capsys):
         (["uf", "--quick", "--jobs", "2"], "--jobs"),
         (["inner", "--keep", "here"], "--keep"),
         (["uf", "--quick", "--keep", "here"], "--keep"),
+        (["inner", "--solvers", "MACS"], "--solvers"),
+        (["uf", "--quick", "--solvers", "MACS"], "--solvers"),
+        (["--solvers", "MACS"], "--solvers: of which one"),
+        (["uf", "--solvers", "MACS", "RVEA"], "unknown solver 'RVEA'"),
+        (["uf", "--solvers", "NSGA-II"], "MACS must be among them"),
     ):
         assert main(["bench", *call]) == 2
         assert words in capsys.readouterr().err

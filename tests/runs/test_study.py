@@ -102,6 +102,18 @@ def test_finished_runs_are_neither_made_again_nor_touched_and_more_may_be_added(
     assert len(study().run(folder).runs) == 3 and len(list(Store.open(folder).runs())) == 4
 
 
+def test_the_runs_of_some_solvers_first(tmp_path):
+    batch = study(solvers={"plain": Plain(), "other": Plain()}, runs=1)
+    some = batch.run(tmp_path / "out", executor=Inline(), solvers=["other"])
+    assert [(run.cell.solver, run.status) for run in some.runs] == [("plain", "missing"), ("other", "finished")]
+    both = batch.run(tmp_path / "out", executor=Inline())
+    assert both.finished == 2 and numbers(some).items() <= numbers(both).items()
+    for wrong, words in ((["plane"], "unknown solver 'plane', did you mean plain"), ("plain", "must be a sequence of labels, not 'plain'")):
+        with pytest.raises(ValueError, match=words):
+            batch.run(tmp_path / "new", solvers=wrong)
+    assert not (tmp_path / "new").exists()
+
+
 @pytest.mark.parametrize("how", ["here", "threads", pytest.param("processes", marks=pytest.mark.slow)])
 def test_numbers_do_not_depend_on_who_makes_the_runs(made, tmp_path, how):
     if how == "here":

@@ -64,6 +64,15 @@ def test_run_resume_and_status(capsys):
     assert "contains no study but other things" in capsys.readouterr().err
 
 
+def test_the_runs_of_some_solvers(capsys):
+    Path("two.toml").write_text(TOML + '[solvers.other]\nsolver = "macs"\nrefine = false\n')
+    command = ["study", "run", "two.toml", "--trust", "--runs", "1", "--solvers"]
+    assert main([*command, "others"]) == 2
+    assert "unknown solver 'others', did you mean other" in capsys.readouterr().err
+    assert main([*command, "other"]) == 0
+    assert "1 of 2 runs finished" in capsys.readouterr().out
+
+
 def test_status_says_what_is_wrong(capsys):
     study = Study.load("gliders.toml", trust=True)
     with Store.claim("out", study.definition()) as store:

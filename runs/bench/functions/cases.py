@@ -64,6 +64,11 @@ class Set:
     quick: tuple[str, ...]
 
 
+def solvers_of(name: str) -> tuple[str, ...]:
+    """The names of the solvers of a set, ours first."""
+    return (OURS, *the_set(name).rivals)
+
+
 def solvers(names: Sequence[str], points: int) -> dict[str, Solver]:
     """Ours and these rivals with so many points: each its defaults otherwise."""
     known: dict[str, Callable[[], Solver]] = {

@@ -20,7 +20,7 @@ from .searches import Fronts, finished, place, search, studies
 SEEDS = 10
 QUICK = 1000
 """Evaluations of the quick benchmark, with one seed."""
-UNJUDGED = "Not judged: what is asked is asked of all functions with all their evaluations."
+UNJUDGED = "Not judged: what is asked is asked of all functions with all their evaluations, against all rivals."
 ENOUGH = 5
 """Seeds from which on a test of ranks can say anything."""
 
@@ -39,11 +39,12 @@ class Contest:
         names: Sequence[str] = (),
         jobs: int = 1,
         keep: str | None = None,
+        only: Sequence[str] | None = None,
     ) -> None:
         """Measure; `rows` are filled at the end, also if it is an interrupt.
 
         Fewer `evaluations` than the set's own, and only the functions of these names, if any; so many `jobs` at the same time; a folder to
-        `keep` searches in, which are not made again.
+        `keep` searches in, which are not made again; `only` these solvers, and not all of the set.
         """
         chosen = the_set(self.name)
         functions = {one.name: one for one in chosen.functions if not names or one.name in names}
@@ -51,11 +52,11 @@ class Contest:
         with place(keep) as folder:
             try:
                 for name, batch in batches.items():
-                    search(batch, folder / name, jobs)
+                    search(batch, folder / name, jobs, only)
             except KeyboardInterrupt:
-                rows += measured(batches, folder, functions)
+                rows += measured(batches, folder, functions, only)
                 raise
-            rows += measured(batches, folder, functions)
+            rows += measured(batches, folder, functions, only)
 
     def quick(self, rows: list[Row]) -> None:
         """One seed and few evaluations of some functions."""
@@ -82,11 +83,11 @@ class Contest:
         return "\n".join(lines)
 
 
-def measured(batches: Mapping[str, Study], folder: Path, functions: Mapping[str, Function]) -> list[Row]:
-    """The rows of all functions from the searches that are finished."""
+def measured(batches: Mapping[str, Study], folder: Path, functions: Mapping[str, Function], only: Sequence[str] | None = None) -> list[Row]:
+    """The rows of all functions from the searches that are finished, of all solvers or only some."""
     fronts: dict[str, Fronts] = {}
     for name, batch in batches.items():
-        fronts |= finished(batch, folder / name) if (folder / name).exists() else {}
+        fronts |= finished(batch, folder / name, only) if (folder / name).exists() else {}
     return [row for one in functions for row in compared(functions[one], fronts.get(one, {}))]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...measures.statistics import summarise
 from ..measured import Column, Row, Target, short
-from .cases import OURS, the_set
+from .cases import OURS, solvers_of, the_set
 
 WITHIN = 0.98
 """As good as the best rival in hypervolume: at least this part of it."""
@@ -29,7 +29,9 @@ def best_rival(found: Mapping[str, float], key: str) -> tuple[str, float]:
 
 
 def _complete(rows: Sequence[Row], name: str) -> list[str]:
-    """The functions of a set that had all their evaluations, if all were measured; else none, and nothing is judged."""
+    """The functions of a set that had all their evaluations, if all were measured with all solvers; else none, and nothing is judged."""
+    if not {row.who for row in rows} >= set(solvers_of(name)):
+        return []
     budgets = {one.name: one.evaluations for one in the_set(name).functions}
     full = [row.case for row in rows if row.who == OURS and row.of("evaluations") >= budgets[row.case]]
     return full if len(full) == len(budgets) else []
@@ -118,7 +120,7 @@ def rank(rows: Sequence[Row], row: Row, key: str) -> str:
 def ratio(rows: Sequence[Row], row: Row, key: str) -> str:
     """Of ours to the best rival's median; empty for others."""
     found = medians(rows, row.case, key)
-    if row.who != OURS or row.who not in found:
+    if row.who != OURS or row.who not in found or len(found) < 2:
         return ""
     rival = best_rival(found, key)[1]
     return short(found[OURS] / rival) if rival else "-"

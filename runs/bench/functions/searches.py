@@ -65,8 +65,8 @@ def place(keep: str | None) -> Iterator[Path]:
         yield Path(folder)
 
 
-def search(batch: Study, folder: Path, jobs: int) -> None:
-    """Make the searches that a study's folder lacks.
+def search(batch: Study, folder: Path, jobs: int, only: Sequence[str] | None = None) -> None:
+    """Make the searches that a study's folder lacks, of all solvers or only some.
 
     Raises
     ------
@@ -78,15 +78,15 @@ def search(batch: Study, folder: Path, jobs: int) -> None:
     others = sorted(one.name for one in folder.parent.glob(f"{folder.name[:-DIGITS]}*") if one != folder)
     if others and not folder.exists():
         print(f"{batch.name}: searches in {', '.join(others)} are of other code, and are not used", file=sys.stderr)
-    summary = batch.run(folder, jobs=jobs, progress=True)
+    summary = batch.run(folder, jobs=jobs, solvers=only, progress=True)
     if summary.failed:
         raise RuntimeError(f"searches failed, so there is nothing to compare:\n{summary}")
 
 
-def finished(batch: Study, folder: Path) -> dict[str, Fronts]:
-    """By function: the fronts of the seeds that all solvers have finished."""
+def finished(batch: Study, folder: Path, only: Sequence[str] | None = None) -> dict[str, Fronts]:
+    """By function: the fronts of the seeds that all solvers have finished, or all of these."""
     runs = {(run.cell.problem, run.cell.solver, run.number): run for run in batch.status(folder).runs if run.finished}
-    who = dict.fromkeys(cell.solver for cell in batch.cells)
+    who = batch.chosen(only)
     fronts: dict[str, Fronts] = {}
     for function in dict.fromkeys(cell.problem for cell in batch.cells):
         numbers = [n for n in range(1, batch.runs + 1) if all((function, one, n) in runs for one in who)]
