@@ -9,9 +9,14 @@ from datetime import date
 from os import PathLike
 from pathlib import Path
 
+import macs
+import problems
+import transcription
 from macs.fronts.provenance import versions
 from macs.io.atomic import read_whole
 
+DIGITS = 12
+"""Of the digest of the code."""
 LARGEST = 2**24
 """Bytes that a file may have of which a digest is made."""
 OPENS, CLOSES = "<!-- ", " -->"
@@ -26,7 +31,7 @@ class PageHeader:
 
     <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md
     digest: the SHA-256 of the files that state what is measured, see `digest`
-    version: 0.1.0
+    version: 0.1.0+c194b98fc0ea
     date: 2026-01-31 -->
 
     Attributes
@@ -36,7 +41,7 @@ class PageHeader:
     digest : str
         Of the study file, or of the files of a bench. The page is out of date once theirs is another.
     version : str
-        Of this package.
+        Of this package when the page was written, and the digest of its code, see `code`. Runs of a study may be of older code.
     date : str
         Year-month-day.
 
@@ -60,7 +65,7 @@ class PageHeader:
     @classmethod
     def now(cls, command: str, files: Sequence[str | PathLike[str]]) -> PageHeader:
         """The header of a page that this command makes today, of what these files state."""
-        return cls(command, digest(*files), versions()["macs-trajectories"], date.today().isoformat())
+        return cls(command, digest(*files), version(), date.today().isoformat())
 
     @classmethod
     def read(cls, text: str) -> PageHeader:
@@ -83,6 +88,17 @@ def digest(*files: str | PathLike[str], text: str = "") -> str:
     return found.hexdigest()
 
 
+def code() -> str:
+    """The first `DIGITS` of a digest of the code that solves, of all floors but `runs`, and of the versions of the packages it uses."""
+    files = [one for package in (problems, transcription, macs) for one in sorted(Path(package.__path__[0]).rglob("*.py"))]
+    return digest(*files, text=f"{versions()}")[:DIGITS]
+
+
+def version() -> str:
+    """This package's version with the digest of its code, as a local version is written."""
+    return f"{versions()['macs-trajectories']}+{code()}"
+
+
 def standing(page: Path, files_of: Callable[[str], Sequence[Path]]) -> tuple[str, bool]:
     """The command of a page or what is wrong with it, and whether the page is as its command would make it now.
 
@@ -91,13 +107,18 @@ def standing(page: Path, files_of: Callable[[str], Sequence[Path]]) -> tuple[str
     page : Path
     files_of : callable
         From a command to the files that state what its page is of; raises ValueError if there is no such command.
+
+    Notes
+    -----
+    Results of other code than there is now are no fault, and are marked as such.
     """
     try:
         header = PageHeader.read(page.read_text(encoding="utf-8"))
         current = digest(*files_of(header.command)) == header.digest
     except (ValueError, OSError) as error:
         return str(error), False
-    return f"{header.command}  ({header.date}{'' if current else ', OUT OF DATE'})", current
+    other = "" if header.version == version() else ", by other code"
+    return f"{header.command}  ({header.date}{other}{'' if current else ', OUT OF DATE'})", current
 
 
 def print_standing(pages: Iterable[Path], files_of: Callable[[str], Sequence[Path]]) -> bool:

@@ -7,6 +7,8 @@ from datetime import date
 
 import pytest
 
+from macs.fronts.provenance import versions
+from runs.data import page_header
 from runs.data.page_header import PageHeader, digest
 
 
@@ -20,6 +22,18 @@ def test_header_as_written_is_read_again(tmp_path):
     assert text.splitlines()[0] == "<!-- made by: macs study report out/one --page one.md"
     assert [line.split(": ")[0] for line in text.splitlines()[1:]] == ["digest", "version", "date"] and text.endswith(" -->")
     assert PageHeader.read(f"{text}\n\n# One\n\n<!-- more -->\n") == header
+
+
+def test_the_version_is_of_the_code_that_searches(tmp_path, monkeypatch):
+    (tmp_path / "macs").mkdir()
+    module = tmp_path / "macs" / "search.py"
+    module.write_text("step = 1\n")
+    monkeypatch.setattr(page_header.macs, "__path__", [str(tmp_path / "macs")])
+    before = page_header.code()
+    assert page_header.code() == before and len(before) == page_header.DIGITS
+    assert page_header.version() == f"{versions()['macs-trajectories']}+{before}"
+    module.write_text("step = 2\n")
+    assert page_header.code() != before
 
 
 def test_digest_is_of_all_files_in_their_order(tmp_path):

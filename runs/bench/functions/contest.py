@@ -14,8 +14,8 @@ from ...measures.statistics import holm, pairwise
 from ...study import Study
 from ..measured import Row, Target, table, verdicts
 from .cases import OURS, Function, the_set
-from .judged import TARGETS, columns_of
-from .searches import Fronts, finished, place, search, studies
+from .judged import JUDGED_BY, LARGER, TARGETS, WORDS, against_the_best, columns_of
+from .searches import SEED, Fronts, finished, place, search, studies
 
 SEEDS = 10
 QUICK = 1000
@@ -69,15 +69,21 @@ class Contest:
     def report(self, rows: Sequence[Row]) -> str:
         """The measured values, and the targets."""
         chosen = the_set(self.name)
+        key = JUDGED_BY[self.name]
+        p = p_values(rows, key)
         lines = [
             f"{chosen.title}: MACS with its defaults against algorithms of pymoo with theirs, at equal evaluations, with as many points.",
             "IGD: mean distance of the true front from the points, in the objectives' units for UF (as in the competition), else in ranges",
             "of the front. Hypervolume: in these ranges, up to 1.1. Distance: of the points from the front, in closed form. Medians and",
-            "quartiles over seeds; rank: of the median among all; p: Mann-Whitney, corrected by Holm for all rivals, from five seeds on.",
+            "quartiles over seeds; rank: of the median among all; to best rival: the median of MACS divided by that of the best rival (IGD:",
+            "below 1 is better, hypervolume: above 1); p: two-sided Mann-Whitney test against MACS, from five seeds on,",
+            f"by {WORDS[key]}, corrected by Holm for all rivals. NSGA-III, MOEA/D and RVEA have as many directions as points: a simplex",
+            f"lattice where one has so many, else evenly spread ones. All seeds are spawned from {SEED}.",
             *([] if chosen.functions[0].front else ["Ranges are those of what is non-dominated among all that all found."]),
             "",
-            table(rows, columns_of(rows, p_values(rows))),
+            table(rows, columns_of(rows, p)),
             "",
+            *against_the_best(rows, key, p),
             *(verdicts(self.targets(rows)) or [UNJUDGED]),
         ]
         return "\n".join(lines)
@@ -119,15 +125,14 @@ def compared(function: Function, fronts: Fronts) -> list[Row]:
     return rows
 
 
-def p_values(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
-    """p of each rival against ours on each function, by the indicator that is asked for, after Holm's correction."""
+def p_values(rows: Sequence[Row], key: str) -> dict[tuple[str, str], float]:
+    """p of each rival against ours on each function by an indicator, after Holm's correction."""
     found: dict[tuple[str, str], float] = {}
     for case in dict.fromkeys(row.case for row in rows):
         own = {row.who: row for row in rows if row.case == case}
-        key = "igd" if case.startswith(("UF", "ZDT")) else "volume"
         if len(own[OURS].values[key]) < ENOUGH:
             continue
-        pairs = pairwise({who: row.values[key] for who, row in own.items()}, larger=key == "volume")
+        pairs = pairwise({who: row.values[key] for who, row in own.items()}, larger=key in LARGER)
         mine = [pair for pair in pairs if OURS in (pair.first, pair.second)]
         for pair, p in zip(mine, holm([pair.p for pair in mine]), strict=True):
             found[case, pair.second if pair.first == OURS else pair.first] = float(p)

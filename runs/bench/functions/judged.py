@@ -12,6 +12,10 @@ from .cases import OURS, solvers_of, the_set
 
 WITHIN = 0.98
 """As good as the best rival in hypervolume: at least this part of it."""
+WORDS = {"igd": "IGD", "volume": "hypervolume"}
+JUDGED_BY = {"many": "volume", "uf": "igd", "zdt": "igd", "constrained": "volume"}
+"""The indicator of each set that tests are of."""
+SIGNIFICANT = 0.05
 LARGER = ("volume",)
 """Indicators of which larger values are better."""
 
@@ -64,21 +68,39 @@ def many(rows: Sequence[Row]) -> list[Target]:
     return made
 
 
-def best_on(rows: Sequence[Row], name: str, key: str, word: str, share: float) -> list[Target]:
+def best_on(rows: Sequence[Row], name: str, share: float) -> list[Target]:
     """The best median of all on at least a share of the functions."""
+    key = JUDGED_BY[name]
     cases = _complete(rows, name)
     if not cases:
         return []
     good = _nowhere_behind(rows, cases, key, 1.0)
-    asked = f"best median {word} on at least {100 * share:g} %"
+    asked = f"best median {WORDS[key]} on at least {100 * share:g} %"
     return [Target(f"{len(cases)} functions", asked, f"{len(good)} of {len(cases)}", len(good) >= share * len(cases))]
+
+
+def against_the_best(rows: Sequence[Row], key: str, p: Mapping[tuple[str, str], float]) -> list[str]:
+    """A line on how many functions ours differs from the best rival of each, and an empty one; none if nothing was tested."""
+    better, worse, tested = 0, 0, 0
+    for case in dict.fromkeys(row.case for row in rows):
+        found = medians(rows, case, key)
+        who, rival = best_rival(found, key) if len(found) > 1 else ("", 0.0)
+        if (case, who) in p:
+            tested += 1
+            if p[case, who] < SIGNIFICANT:
+                ahead = (found[OURS] > rival) == (key in LARGER)
+                better, worse = better + ahead, worse + (not ahead)
+    if not tested:
+        return []
+    counts = f"better on {better}, worse on {worse}, no difference shown on {tested - better - worse}"
+    return [f"Against the best rival of each function (p < {SIGNIFICANT:g}): {counts}.", ""]
 
 
 TARGETS: dict[str, Callable[[Sequence[Row]], list[Target]]] = {
     "many": many,
-    "uf": lambda rows: best_on(rows, "uf", "igd", "IGD", 0.7),
-    "zdt": lambda rows: best_on(rows, "zdt", "igd", "IGD", 0.6),
-    "constrained": lambda rows: best_on(rows, "constrained", "volume", "hypervolume", 0.6),
+    "uf": lambda rows: best_on(rows, "uf", 0.7),
+    "zdt": lambda rows: best_on(rows, "zdt", 0.6),
+    "constrained": lambda rows: best_on(rows, "constrained", 0.6),
 }
 
 
@@ -94,6 +116,7 @@ def columns_of(rows: Sequence[Row], p: Mapping[tuple[str, str], float]) -> tuple
         *columns,
         ("p", "Holm", lambda row: f"{p[row.case, row.who]:.2g}" if (row.case, row.who) in p else ""),
         ("evalua-", "tions", lambda row: f"{row.of('evaluations'):.0f}"),
+        ("", "points", lambda row: f"{row.of('points'):.0f}"),
         ("s", "", lambda row: short(row.of("seconds"))),
         ("", "seeds", lambda row: str(len(row.values["seconds"]))),
     )
@@ -109,9 +132,9 @@ def spread(row: Row, key: str) -> str:
 
 
 def rank(rows: Sequence[Row], row: Row, key: str) -> str:
-    """The place of the median among all solvers, 1 for the best."""
+    """The place of the median among all solvers, 1 for the best; none where half the runs found nothing."""
     found = medians(rows, row.case, key)
-    if row.who not in found:
+    if row.who not in found or found[row.who] == (0.0 if key in LARGER else np.inf):
         return "-"
     values, own = np.array(list(found.values())), found[row.who]
     return str(1 + int((values > own).sum() if key in LARGER else (values < own).sum()))

@@ -8,20 +8,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import macs
-import problems
-import transcription
 from macs.front import Front
-from macs.fronts.provenance import versions
 
-from ...data.page_header import digest
+from ...data.page_header import DIGITS, code
 from ...study import Study
 from .cases import Function, solvers
 
 SEED = 2026
 """The one that the seeds of all searches are spawned from."""
-DIGITS = 12
-"""Of the digest of the code, in the name of a folder."""
 
 Fronts = dict[str, list[Front]]
 """By solver, one for each seed that all solvers have finished."""
@@ -47,12 +41,6 @@ def studies(
         )
         for points, group in groups.items()
     }
-
-
-def code() -> str:
-    """A digest of the code that searches, and of the versions of the packages it uses."""
-    files = [one for package in (problems, transcription, macs) for one in sorted(Path(package.__path__[0]).rglob("*.py"))]
-    return digest(*files, text=f"{versions()}")[:DIGITS]
 
 
 @contextmanager
