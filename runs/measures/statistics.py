@@ -61,7 +61,7 @@ class PairTest:
     effect : str
         "negligible", "small", "medium" or "large".
     note : str
-        States that there are too few runs for any p below 0.05; usually empty.
+        States that there are too few runs for any corrected p below 0.05; usually empty.
     """
 
     first: str
@@ -124,14 +124,15 @@ def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: boo
     from scipy.stats import mannwhitneyu, rankdata
 
     costs = _all_costs(samples, larger)
+    pairs = [*combinations(costs, 2)]
     found = []
-    for one, other in combinations(costs, 2):
+    for one, other in pairs:
         a, b = costs[one], costs[other]
         # Of ranks, because infinities have no differences.
         ranks = rankdata(np.concatenate([a, b]))
         result = mannwhitneyu(ranks[: len(a)], ranks[len(a) :], alternative="two-sided", method="auto")
-        least = min(1.0, 2.0 / comb(len(ranks), len(a)))
-        note = f"Too few runs: p cannot be below {least:.2g}." if least > ALPHA else ""
+        least = min(1.0, len(pairs) * 2.0 / comb(len(ranks), len(a)))
+        note = f"Too few runs: p, corrected, cannot be below {least:.2g}." if least > ALPHA else ""
         statistic, p, size = float(result.statistic), float(result.pvalue), a12(a, b)
         found.append(PairTest(one, other, statistic, p, p, size, effect(size), note))
     return [replace(pair, p_holm=float(p)) for pair, p in zip(found, holm([pair.p for pair in found]), strict=True)]

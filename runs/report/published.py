@@ -118,7 +118,7 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
     units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
     known = {**(columns or {}), **paper.further}
     heads += [known.get(key) or Column(key, units.get(key, ""), digits=4) for key in keys]
-    heads += [Column("times as fast", digits=2)] if "seconds" in keys else []
+    heads += [Column("the paper's time / ours", digits=2)] if "seconds" in keys else []
     caption = f"Beside {paper.source}" if paper.source else "Beside published figures"
     words = [f"{word}: {text}." for word, text in (("The paper", paper.note), ("What differs", paper.differs)) if text]
     return table(heads, rows, f"{caption}.", [*notes, *words])

@@ -241,7 +241,7 @@ def _figures(comparison: Comparison) -> dict[str, Figure]:
                 label = f"{CHARGED}, of {charge.solver}"
             if runs_so_far:
                 stem = f"{indicator.lower()}-over-{axis.replace(' ', '-')}"
-                ylabel = f"{indicator} (normalised)"
+                ylabel = f"{indicator} (normalised), as claimed"
                 found[stem] = convergence_figure(runs_so_far, xlabel=label, ylabel=ylabel, larger=larger, log=not larger)
     return found
 

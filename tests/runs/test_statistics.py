@@ -114,11 +114,17 @@ def test_pairs_as_scipy_has_them():
 def test_pairs_by_hand():
     # Of the 20 ways to rank three among six, one is this apart, and one the other way round.
     (c,) = pairwise({"a": [1.0, 2.0, 3.0], "b": [4.0, 5.0, 6.0]})
-    assert c.p == pytest.approx(0.1) and c.a12 == 1.0 and c.effect == "large" and c.note == "Too few runs: p cannot be below 0.1."
+    assert (
+        c.p == pytest.approx(0.1) and c.a12 == 1.0 and c.effect == "large" and c.note == "Too few runs: p, corrected, cannot be below 0.1."
+    )
     # Of 40 places for a single run two are at the ends: p may be 0.05, and is not called impossible; of 39 it may not.
     many = np.arange(39.0)
     assert pairwise({"a": [50.0], "b": many})[0].note == ""
-    assert pairwise({"a": [50.0], "b": many[1:]})[0].note == "Too few runs: p cannot be below 0.051."
+    assert pairwise({"a": [50.0], "b": many[1:]})[0].note == "Too few runs: p, corrected, cannot be below 0.051."
+    # Five of each may be 2/252 apart, which is enough for six pairs and not for ten.
+    five = {name: [float(5 * i + j) for j in range(5)] for i, name in enumerate("abcde")}
+    assert all("cannot be below 0.079" in pair.note and pair.p_holm > 0.05 for pair in pairwise(five))
+    assert all(pair.note == "" and pair.p_holm < 0.05 for pair in pairwise({name: five[name] for name in "abcd"}))
 
 
 def test_samples_that_are_alike_do_not_differ():

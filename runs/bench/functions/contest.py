@@ -75,7 +75,7 @@ class Contest:
             f"{chosen.title}: MACS with its defaults against algorithms of pymoo with theirs, at equal evaluations, with as many points.",
             "IGD: mean distance of the true front from the points, in the objectives' units for UF (as in the competition), else in ranges",
             "of the front. Hypervolume: in these ranges, up to 1.1. Distance: of the points from the front, in closed form. Medians and",
-            "quartiles over seeds; rank: of the median among all; to best rival: the median of MACS divided by that of the best rival (IGD:",
+            "quartiles over seeds; rank: of the median among all; to best rival: the median of MACS divided by the best rival's (IGD:",
             "below 1 is better, hypervolume: above 1); p: two-sided Mann-Whitney test against MACS, from five seeds on,",
             f"by {WORDS[key]}, corrected by Holm for all rivals. NSGA-III, MOEA/D and RVEA have as many directions as points: a simplex",
             f"lattice where one has so many, else evenly spread ones. All seeds are spawned from {SEED}.",

@@ -103,7 +103,8 @@ class Page:
         what = ", ".join(f"{name} {number}" for name, number in (first or versions()).items() if name != "platform")
         made = (
             f"{counted(len(times), 'run')}, {duration(float(np.sum(times)))} together, {duration(float(np.median(times)))} in the median, "
-            f"on {_machine()}. Page made on {self._header.date} by `{self._header.command}`. Versions: {what}."
+            f"on {_machine()}. Seeds are spawned from {study['seed']}. Page made on {self._header.date} by `{self._header.command}`. "
+            f"Versions: {what}."
         )
         texts = [
             str(self._header),
