@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -139,6 +139,17 @@ class Comparison:
     def known(self) -> Front:
         """A front with the names, units and senses of the objectives."""
         return self.every[0]
+
+    def only(self, solver: str) -> Comparison:
+        """The same of one solver alone."""
+        return replace(
+            self,
+            runs={solver: self.runs[solver]},
+            fronts={solver: self.fronts[solver]},
+            counting={solver: self.counting[solver]},
+            failures={solver: self.failures.get(solver, 0)},
+            left_out={solver: self.left_out.get(solver, 0)},
+        )
 
     def union(self) -> Reference:
         """The non-dominated points of all runs. Raises ValueError if there are none.

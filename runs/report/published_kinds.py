@@ -132,7 +132,8 @@ class Published(Section, tag_field="of", kw_only=True):
 
 
 class Indicators(Published, tag="indicators"):
-    """GD and IGD to the points of the union of all runs, and the time of a run."""
+    """GD and IGD to the points of the union of all runs of the same solver, as papers have them that report one solver, and the time of a
+    run. Beside them ours to the union of all solvers."""
 
     columns: ClassVar[Mapping[str, Column]] = {
         "gd_mean": Column("mean GD", digits=4),
@@ -141,24 +142,40 @@ class Indicators(Published, tag="indicators"):
         "igd_variance": Column("variance", digits=4),
         "seconds": Column("time", "s", digits=4),
     }
+    further: ClassVar[Mapping[str, Column]] = {
+        "gd_all": Column("mean GD, all solvers", digits=4),
+        "igd_all": Column("mean IGD, all solvers", digits=4),
+    }
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        union, times = comparison.union(), spent(comparison)["time [s]"]
-        found = samples(comparison, union, curve=False) if len(union.front) else {"GD": {}, "IGD": {}}
+        times, together = spent(comparison)["time [s]"], self._statistics(comparison)
         rows: dict[str, list[Figures]] = {}
         for solver in comparison.runs:
-            if solver in found["GD"]:
-                gd, igd = summarise(found["GD"][solver]), summarise(found["IGD"][solver])
-                seconds = float(np.mean(times[solver])) if solver in times else None
-                rows[solver] = [dict(zip(self.columns, (gd.mean, gd.variance, igd.mean, igd.variance, seconds), strict=True))]
+            if solver in together:
+                alone = self._statistics(comparison.only(solver)).get(solver, {})
+                seconds = {"seconds": float(np.mean(times[solver]))} if solver in times else {}
+                rows[solver] = [{**alone, **seconds, "gd_all": together[solver]["gd_mean"], "igd_all": together[solver]["igd_mean"]}]
         return rows
+
+    @staticmethod
+    def _statistics(comparison: Comparison) -> dict[str, Figures]:
+        """By solver, of the indicators to the union of all that are compared; none if that is empty."""
+        union = comparison.union() if comparison.every else None
+        if union is None or not len(union.front):
+            return {}
+        gd, igd = ({who: summarise(runs) for who, runs in samples(comparison, union, curve=False)[name].items()} for name in ("GD", "IGD"))
+        return {
+            who: {"gd_mean": gd[who].mean, "gd_variance": gd[who].variance, "igd_mean": igd[who].mean, "igd_variance": igd[who].variance}
+            for who in gd
+        }
 
     def remark(self, comparison: Comparison) -> str:
         union = comparison.union()
         if not len(union.front):
             return "no run found a point."
         scale = Scale.of(union.front, what=union.what, curve=False).describe().split(". Hypervolume")[0]
-        return f"{scale[0].lower()}{scale[1:]}; GD and IGD to its points. Variance with divisor n - 1."
+        own = "GD and IGD are to the points of the union of the solver's own runs, in its own ranges"
+        return f"{own}; for all solvers together, {scale[0].lower()}{scale[1:]}. Variance with divisor n - 1."
 
 
 class Hypervolume(Published, tag="hypervolume", kw_only=True):
