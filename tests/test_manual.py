@@ -34,12 +34,16 @@ PAGES = [
     *(page for page in sorted((ROOT / "docs").rglob("*.md")) if page.relative_to(ROOT / "docs").parts[0] not in OTHERS),
 ]
 SLOW = (
+    "docs/choosing.md",
     "docs/clusters.md",
+    "docs/pymoo.md",
     "docs/settings.md",
     "docs/studies.md",
     "docs/sweep-or-search.md",
     "docs/vector-problems.md",
+    "docs/stating/limits.md",
     "docs/stating/objectives.md",
+    "docs/stating/tables.md",
 )
 """Pages that take more than some seconds."""
 COMMANDS = ("docs/first-steps.md",)

@@ -142,10 +142,7 @@ class Indicators(Published, tag="indicators"):
         "igd_variance": Column("variance", digits=4),
         "seconds": Column("time", "s", digits=4),
     }
-    further: ClassVar[Mapping[str, Column]] = {
-        "gd_all": Column("mean GD, all solvers", digits=4),
-        "igd_all": Column("mean IGD, all solvers", digits=4),
-    }
+    further: ClassVar[Mapping[str, Column]] = {f"{key}_all": Column(f"mean {key.upper()}, all solvers", digits=4) for key in ("gd", "igd")}
 
     def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
         times, together = spent(comparison)["time [s]"], self._statistics(comparison)
@@ -163,11 +160,10 @@ class Indicators(Published, tag="indicators"):
         union = comparison.union() if comparison.every else None
         if union is None or not len(union.front):
             return {}
-        gd, igd = ({who: summarise(runs) for who, runs in samples(comparison, union, curve=False)[name].items()} for name in ("GD", "IGD"))
-        return {
-            who: {"gd_mean": gd[who].mean, "gd_variance": gd[who].variance, "igd_mean": igd[who].mean, "igd_variance": igd[who].variance}
-            for who in gd
-        }
+        found = samples(comparison, union, curve=False)
+        pairs = {who: (summarise(found["GD"][who]), summarise(found["IGD"][who])) for who in found["GD"]}
+        keys = ("gd_mean", "gd_variance", "igd_mean", "igd_variance")
+        return {who: dict(zip(keys, (gd.mean, gd.variance, igd.mean, igd.variance), strict=True)) for who, (gd, igd) in pairs.items()}
 
     def remark(self, comparison: Comparison) -> str:
         union = comparison.union()

@@ -133,6 +133,7 @@ def test_populations_in_one_call_and_one_by_one(monkeypatch):
     assert "at least 4 times as fast" in population.report(rows)
 
 
+@pytest.mark.slow
 def test_searches_for_the_same_work_and_points(small):
     case = search.Search("goddard", 10_000, 100, 0.999, goddard.reference)
     rows: list[Row] = []
@@ -185,6 +186,7 @@ def test_a_guided_search_beside_an_even_one():
     assert all(len(line) <= 150 for line in prefer.report(rows).splitlines())
 
 
+@pytest.mark.slow
 def test_intervals_by_density_beside_equal_ones():
     rows: list[Row] = []
     density.bench_density(rows, (replace(density.QUICK[1], words=density.on(10, steps=7)),))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from operator import methodcaller
 
 import numpy as np
@@ -182,6 +183,15 @@ def test_a_small_contest():
     assert "MW1" in text and "MISSED" not in text and all(len(line) <= 160 for line in text.splitlines())
 
 
+@pytest.fixture
+def two_rivals(monkeypatch):
+    """Sets with two quick rivals alone."""
+    whole = cases.the_set
+    for module in (cases, contest):
+        monkeypatch.setattr(module, "the_set", lambda name: replace(whole(name), rivals=("NSGA-II", "NSGA-III")))
+
+
+@pytest.mark.usefixtures("two_rivals")
 def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys):
     first: list[Row] = []
     again: list[Row] = []
@@ -209,6 +219,7 @@ def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys
     assert f"searches in {folder.name} are of other code" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("two_rivals")
 def test_only_some_solvers(tmp_path):
     """Then nothing is judged, and a later call makes the others: the seeds are the same."""
     alone: list[Row] = []

@@ -81,6 +81,7 @@ def test_a_repetition_is_prepared_anew_and_all_sizes_come_before_the_next(capsys
     assert [json.loads(line)[:2] for line in capsys.readouterr().out.splitlines()] == [[one.name, size] for size in made[1:]]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")
 def test_the_command(capsys, monkeypatch):
     """Tiny sizes in processes of their own; the exit code follows the exponents."""

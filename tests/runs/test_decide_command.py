@@ -169,6 +169,7 @@ def test_names_with_commas(here: Path, capsys: pytest.CaptureFixture[str]) -> No
         assert words in wrong(capsys, "box.nc", "--reference", text), text
 
 
+@pytest.mark.slow
 def test_commands_in_a_terminal(fronts: Path, here: Path) -> None:
     parent, child = pty.openpty()
     work = subprocess.Popen([*MACS, "decide", str(fronts / "goddard.nc")], stdin=child, stdout=child, stderr=child, close_fds=True)

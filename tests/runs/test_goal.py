@@ -149,6 +149,7 @@ shares = [0.25, 1.0]
 """
 
 
+@pytest.mark.slow
 def test_reports_show_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "glide.py").write_text((Path(__file__).parent / "misbehaving.py").read_text(encoding="utf-8"), encoding="utf-8")

@@ -52,6 +52,7 @@ def page_of(place: Path, *more: str) -> int:
     return main(["study", "report", str(place / "out"), "--page", str(place / "small.md"), "--study", str(place / "small.toml"), *more])
 
 
+@pytest.mark.slow
 def test_a_page_has_tables_pictures_and_where_they_are_from(place, capsys):
     assert page_of(place) == 0
     text = (place / "small.md").read_text()

@@ -321,6 +321,7 @@ def alive(pid: int) -> bool:
         return False
 
 
+@pytest.mark.slow
 def test_kill_9_of_the_study_and_of_a_worker_loses_nothing(tmp_path):
     coordinator = started(tmp_path)
     out = tmp_path / "out"

@@ -116,7 +116,7 @@ def test_tables_of_statistics_say_what_the_statistics_are():
     pairs = pairs_table(samples)
     for row, c in zip(pairs.rows[:3], pairwise(samples["igd"]), strict=True):
         assert row[3:7] == (c.p, c.p_holm, c.a12, c.effect) and row[7] == "neither"
-    assert "cannot be below 0.1" in pairs.notes[1]
+    assert "cannot be below 0.3" in pairs.notes[1]
     many = {"igd": {name: list(np.arange(10.0) + shift) for name, shift in (("ours", 0.0), ("theirs", 20.0))}}
     assert pairs_table(many).rows[0][-1] == "ours"
     assert pairs_table({"hypervolume": many["igd"]}).rows[0][-1] == "theirs"

@@ -66,6 +66,7 @@ def test_all_may_work_apart(tmp_path):
     assert comparison.transcription == EACH and set(comparison.fronts) == {"macs", "nsga2"}
 
 
+@pytest.mark.slow
 def test_searches_of_macs_may_end_when_they_are_done(tmp_path):
     made = study(terms={"macs": {**APART["macs"], "evaluations": "auto", "inner": "auto"}}, runs=1, transcriptions="shooting:5")
     cells = {cell.solver: cell for cell in made.cells}

@@ -30,6 +30,7 @@ def last(settings: Any, function: Any, budget: int, bounds: Any = CUBE, **labels
     return state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["smsemoa", "agemoea2", "rvea", "ctaea"])
 @pytest.mark.parametrize(("plain", "evaluations", "limit"), [(zdt(1), 3000, 0.5), (dtlz(2, 3), 2000, 0.15)], ids=["zdt1", "dtlz2"])
 def test_they_come_near_known_fronts(name: str, plain: Any, evaluations: int, limit: float) -> None:

@@ -211,6 +211,7 @@ def test_a_black_box_point_is_drawn_among_its_variables():
     assert [ax.get_ylabel() for ax in axes] == ["span [m]", "chord [m]", "twist"]
 
 
+@pytest.mark.slow
 def test_pictures_need_no_display(tmp_path):
     code = "from synthetic_fronts import flights; f = flights(); f.plot().figure.savefig('a.png'); f[0].plot()[0].figure.savefig('b.png')"
     environment = {"PATH": "", "PYTHONPATH": ":".join(sys.path), "MPLBACKEND": "TkAgg", "MPLCONFIGDIR": str(tmp_path)}

@@ -63,6 +63,7 @@ def test_what_no_solve_reached_is_not_called_converged():
     assert point.status != "converged" and not point.verified and "no solve converged" in point.note
 
 
+@pytest.mark.slow
 def test_feasible_but_not_optimal_is_not_called_converged():
     """One iteration leaves a way feasible, and far from the least cost, which is huge elsewhere: in the scale of that nothing is left."""
     problem = Problem("detour")

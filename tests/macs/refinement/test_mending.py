@@ -105,6 +105,7 @@ def small() -> dict:
     return {"evaluations": 60, "seed": 1}
 
 
+@pytest.mark.slow
 def test_who_mends():
     """MACS with gradients does, unless its mesh is fixed; MACS without, `paper()` and the baselines only mark."""
     problem = load("goddard")

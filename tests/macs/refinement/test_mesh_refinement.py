@@ -201,6 +201,7 @@ def test_what_has_no_mesh_of_ours_is_refused():
         flights(transcriptions=None).refine_mesh()
 
 
+@pytest.mark.slow
 def test_a_search_may_refine_its_meshes_in_the_end():
     front = MACS(mesh="adaptive", mesh_tolerance=1e-5, archive=3).solve(load("orbit_rise"), DFET(5, 2), evaluations=60, seed=1)
     assert front.stats["gradient_solves"] >= len(front) > 0 and front.stats["evaluations"] == 60

@@ -54,6 +54,7 @@ def test_a_smooth_problem_keeps_the_coarse_mesh():
     assert found.ends is not None and len(found.ends) == 2
 
 
+@pytest.mark.slow
 def test_boundary_layers_get_short_elements():
     found = found_mesh(layered(0.01).compile(), 1e-3, 1e-6)
     assert found.search == COARSE and found.fine is not None
@@ -63,12 +64,14 @@ def test_boundary_layers_get_short_elements():
     assert lengths[0] < 0.03 and lengths[-1] < 0.03 and lengths.max() > 0.05
 
 
+@pytest.mark.slow
 def test_a_search_without_a_transcription_finds_one():
     front = MACS(agents=4, archive=5).solve(layered(0.02), evaluations=200, seed=1)
     assert len(front) >= 3 and front.verified.all()
     assert front.stats["gradient_solves"] > 200 // 20, "what the mesh cost is counted"
 
 
+@pytest.mark.slow
 def test_a_search_begins_with_the_optima_of_single_objectives():
     """Of this arm's quickest way there are many local optima, in which searches of thousands of candidates end: 3.2 seconds and more."""
     front = MACS(agents=4).solve(load("standard/two_link_arm"), evaluations=30, seed=1)
@@ -121,6 +124,7 @@ def test_a_mesh_with_more_elements_than_a_search_is_to_have_is_thinned_evenly():
     assert len(lengths) == MOST and lengths.max() / lengths.min() < 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("budget", [None, 300])
 def test_the_number_of_evaluations_has_a_default(budget):
     problem = smooth()

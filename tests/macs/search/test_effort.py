@@ -143,6 +143,7 @@ def test_a_divided_search_takes_a_part_of_the_work_and_finds_as_good_a_front():
     assert "Made feasible: " in auto.table()
 
 
+@pytest.mark.slow
 def test_a_divided_search_goes_on_to_the_same_bits(tmp_path):
     def go(problem, **more):
         return MACS(agents=4, archive=4, mesh="fixed").solve(problem, MESH, evaluations=120, seed=2, inner="auto", verify=None, **more)
@@ -165,6 +166,7 @@ def test_others_use_the_fixed_rule():
     assert np.array_equal(auto.F, projected.F) and "ways" not in auto.stats
 
 
+@pytest.mark.slow
 def test_without_gradients_candidates_are_made_feasible_as_by_the_fixed_rule():
     """Nothing else would: what is only propagated costs little, and is hardly ever feasible."""
 

@@ -130,6 +130,7 @@ def test_the_front_is_dense_where_the_preference_is_good(prefer, f1):
         assert prefer.rank(front).best.objectives["f1"] == pytest.approx(f1, abs=5e-3)
 
 
+@pytest.mark.slow
 def test_three_objectives_of_which_one_is_maximised():
     def sphere(X):
         a, b = 0.5 * np.pi * X[:, 0], 0.5 * np.pi * X[:, 1]

@@ -54,6 +54,7 @@ def unreachable() -> Problem:
     return problem
 
 
+@pytest.mark.slow
 def test_the_conflict_is_known_after_few_solves_by_all_ways():
     """A metre is an eighth of the scale; the nearest end at rest, on any mesh with an edge or node in the middle, is at 0.25."""
     problem = unreachable().compile()

@@ -257,6 +257,7 @@ def test_where_the_front_is_a_surface_lone_agents_try_all_coordinates(m, tried):
     assert set(trials.tried[4:]) == {tried + 1}
 
 
+@pytest.mark.slow
 def test_lone_agents_get_evaluations_as_long_as_they_gain():
     """Each comes to the front of DTLZ2, and then nothing is left for it to gain. Hardly more is left for the others, so that its share
     falls, but not to the least."""

@@ -116,6 +116,7 @@ def test_where_solves_for_feasibility_find_nothing_no_candidate_is_projected() -
     assert evaluator.counts.evaluations == 10 and evaluator.counts.fallbacks == 0 and len(state.closest)
 
 
+@pytest.mark.slow
 def test_what_nothing_makes_feasible_is_projected(monkeypatch) -> None:
     monkeypatch.setattr(multistart, "TRIED", (1, 0))
     evaluator = projecting(walk(least=0.5), METHOD)

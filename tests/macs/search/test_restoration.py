@@ -37,6 +37,7 @@ def off_the_arc(F):
     return np.abs(np.linalg.norm(c, axis=1) - 1.0), np.diff(np.concatenate([[0.0], angle, [np.pi / 2]])).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_front_on_a_thin_feasible_set_is_covered(seed):
     """With a tolerance of 1e-6. Without restoration three points at most are found, or a part of the arc."""
@@ -47,12 +48,14 @@ def test_a_front_on_a_thin_feasible_set_is_covered(seed):
     assert len(alone) < 10 or off_the_arc(alone.F)[1] > 0.5
 
 
+@pytest.mark.slow
 def test_equalities_that_are_stated_as_a_band_of_absolute_values():
     """Their residuals have one sign on both sides, which makes models worse, not useless."""
     front = MACS(archive=30).minimize(Sphere(4, "G"), evaluations=20_000, seed=1, progress=False)
     assert len(front) == 30 and off_the_arc(front.F)[1] < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "optimum", "near"), [("g5", 5126.4967, 1e-4), ("g13", 0.0539415, 1e-2), ("g15", 961.7150222899, 1e-5)])
 def test_published_optima_with_equalities_are_found(name, optimum, near):
     """Two or three nonlinear equalities, to 1e-6. Optima: Liang and others, Problem definitions for the CEC 2006 special session on
@@ -67,6 +70,7 @@ def test_constraints_of_unlike_scales_are_met_together():
     assert len(front) and front.violation.max() <= 1e-6
 
 
+@pytest.mark.slow
 def test_a_portfolio_of_assets_that_are_independent():
     """Variance against return of shares that sum to one, a constraint with one value. The least variance has shares as 1 / variance of each
     asset, the largest return has one asset."""
@@ -103,6 +107,7 @@ def restored(name, evaluations, seed=1):
     return taken / evaluations
 
 
+@pytest.mark.slow
 def test_as_many_points_are_restored_as_pays():
     assert 0.0 < restored("bnh", 3000) < 0.05 and restored("osy", 3000) < 0.05
     assert restored("g13", 3000) > 0.1

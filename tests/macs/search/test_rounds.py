@@ -152,6 +152,7 @@ def whole(seed: int) -> Front:
     return SMALL.solve(walking(), MESH, seed=seed, verify=None)
 
 
+@pytest.mark.slow
 def test_a_front_is_found_without_a_number():
     """The front of `goddard` is known; five times the budget finds no more of it."""
     front = MACS(mesh="fixed").solve(compiled("goddard"), DFET(4, 6), seed=1, verify=None)

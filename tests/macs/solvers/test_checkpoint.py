@@ -143,6 +143,7 @@ def test_several_interruptions_in_a_row(file) -> None:
     assert_same(minimize(checkpoint=file), uninterrupted())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refine", [True, False])
 def test_a_trajectory_problem_goes_on_to_the_same_bits(file, refine) -> None:
     solver = MACS(agents=4, archive=6, refine=refine, refine_every=25)
@@ -165,6 +166,7 @@ def test_a_finished_run_returns_its_front_without_evaluations(file) -> None:
     assert again.stats["wall_time"] == pytest.approx(first.stats["wall_time"], abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_finished_search_is_not_polished_twice(file, monkeypatch) -> None:
     solve(checkpoint=file)
     whole = solved()
@@ -383,6 +385,7 @@ def killed(folder: Path, script: str, when: int) -> tuple[int, int]:
     return done, log.stat().st_size - done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", [SMALL, MOPSO(particles=10)], ids=["MACS", "MOPSO"])
 def test_kill_9(tmp_path, solver) -> None:
     done, again = killed(tmp_path, SCRIPT.replace("SOLVER", repr(solver)), 200)
