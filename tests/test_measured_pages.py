@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -105,3 +106,24 @@ def test_wrong_pages_are_refused_before_any_work(words, said, capsys, monkeypatc
 def test_the_script_runs_by_itself():
     done = subprocess.run([sys.executable, str(SCRIPT)], capture_output=True, text=True, cwd=ROOT, timeout=60)
     assert done.returncode in (0, 1) and done.stderr == "" and len(done.stdout.splitlines()) == len(PAGES)
+
+
+def test_terms_of_table_vii_are_those_that_its_study_of_parametrisations_found_the_best():
+    choosing, stating = (tomllib.loads((check.STUDIES / f"reentry-{name}.toml").read_text()) for name in ("parametrisations", "table7"))
+    best: dict[str, tuple[float, str, str]] = {}
+    section = ""
+    inside = False
+    for line in (SCRIPT.parent / "reentry-parametrisations.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("## "):
+            section = line.removeprefix("## reentry_case1, ")
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) == 11:
+            inside = cells[0] == "hypervolume" or (inside and not cells[0])
+            if inside:
+                terms = choosing["terms"].get(cells[1], {})
+                found = (float(cells[6]), terms.get("transcription", section), terms.get("start", choosing["start"]))
+                label = cells[1].removesuffix(", uniform")
+                best[label] = max(best.get(label, found), found)
+    terms = {label: (one["transcription"], one.get("start", stating["start"])) for label, one in stating["terms"].items()}
+    assert terms == {label: found[1:] for label, found in best.items()} and terms.keys() == stating["solvers"].keys()
+    assert stating["solvers"].items() <= choosing["solvers"].items() and stating["seed"] != choosing["seed"]
