@@ -36,16 +36,26 @@ PAGES = [
 SLOW = (
     "docs/choosing.md",
     "docs/clusters.md",
+    "docs/costates.md",
+    "docs/files.md",
+    "docs/first-steps.md",
+    "docs/meshes.md",
     "docs/pymoo.md",
     "docs/settings.md",
     "docs/studies.md",
     "docs/sweep-or-search.md",
     "docs/vector-problems.md",
+    "docs/verification.md",
+    "docs/extending/problem.md",
+    "docs/stating/guesses.md",
     "docs/stating/limits.md",
     "docs/stating/objectives.md",
+    "docs/stating/parameters.md",
+    "docs/stating/periodic.md",
+    "docs/stating/phases.md",
     "docs/stating/tables.md",
 )
-"""Pages that take more than some seconds."""
+"""Pages that take more than a second."""
 COMMANDS = ("docs/first-steps.md",)
 """Pages whose commands are run, one after the other."""
 WORDS = 900

@@ -103,6 +103,7 @@ def test_wrong_pages_are_refused_before_any_work(words, said, capsys, monkeypatc
     assert main(["bench", *words]) == 2 and said in capsys.readouterr().err and not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_script_runs_by_itself():
     done = subprocess.run([sys.executable, str(SCRIPT)], capture_output=True, text=True, cwd=ROOT, timeout=60)
     assert done.returncode in (0, 1) and done.stderr == "" and len(done.stdout.splitlines()) == len(PAGES)

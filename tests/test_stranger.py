@@ -112,6 +112,7 @@ def test_every_point_of_it_flies(front):
         assert 1 - flight["burn"]["m"][-1] <= point.parameters["tank"] + 1e-6
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits_in_another_process(tmp_path):
     script = tmp_path / "again.py"
     script.write_text(
@@ -164,6 +165,7 @@ def test_a_wrong_statement_costs_no_evaluation():
     assert not seen
 
 
+@pytest.mark.slow
 def test_units_of_any_size():
     """The same flight in metres and in thousands of kilometres is the same front, scaled."""
 

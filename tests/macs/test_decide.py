@@ -121,6 +121,7 @@ PHYSICAL = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preference", PHYSICAL, ids=["crisp", "range", "fuzzy"])
 def test_physical_programming_finds_its_optimum(preference: PhysicalProgramming) -> None:
     (stage,) = preference.stages(cart().compile().goals, RANGES)
@@ -168,6 +169,7 @@ def test_solves_do_not_stall_at_kinks_of_memberships(preference: FuzzySatisfacto
     assert choice.value <= ranking.values[ranking.order[0]] + 1e-8
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(weight=st.floats(-3, 3), wide=st.tuples(st.floats(-2, 2), st.floats(-2, 2)))
 def test_any_weights_in_any_ranges(weight: float, wide: tuple[float, float]) -> None:
@@ -200,6 +202,7 @@ def test_weights_are_those_of_the_sum() -> None:
     )
 
 
+@pytest.mark.slow
 def test_without_anything_but_a_preference() -> None:
     choice = decide(cart(), ReferencePoint({"effort": 10.0, "time": 0.7}))
     assert choice.ranges.best["time"] == pytest.approx(0.5, abs=1e-6) and choice.ranges.worst["effort"] == pytest.approx(96.0, rel=1e-4)
@@ -247,6 +250,7 @@ def speed(T: float) -> float:
     return float(optimal_flight(T, 2)["vx"][-1])
 
 
+@pytest.mark.slow
 def test_goddard_between_time_and_speed() -> None:
     choice = goddard(WeightedSum({"flight time": 1.0, "horizontal speed": 0.5}))
     truth = minimize_scalar(
@@ -265,6 +269,7 @@ def test_an_end_that_its_mesh_makes_too_good_still_is_one() -> None:
     assert choice.ranges.best[TIME] == pytest.approx(109.08, abs=0.01) and choice.ranges.worst[TIME] == pytest.approx(250.0)
 
 
+@pytest.mark.slow
 def test_peaks_of_the_user() -> None:
     # The front is (T, 16 / T^4), from 1 to 3.
     choice = decide(shuttle(), DFET(4, 2), ReferencePoint({"time": 1.5}), starts=1)
@@ -279,6 +284,7 @@ def test_peaks_of_the_user() -> None:
         decide(shuttle(), DFET(4, 2), GoalProgramming({"largest thrust squared": Around(5.0)}), starts=1)
 
 
+@pytest.mark.slow
 def test_three_objectives_and_one_that_does_not_matter() -> None:
     choice = decide(corners(), MESH, WeightedSum({"from 0": 1.0, "from 2": 3.0}), starts=1)
     # Squared distances from two unit vectors, one thrice as heavy: a quarter of the way from the other.
@@ -298,6 +304,7 @@ def test_where_a_state_is_limited() -> None:
     assert a == pytest.approx(b, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_ranges_that_say_nothing_of_where_the_front_is() -> None:
     # The optimum is thirty times the ranges away: what the derived problem looks for is not confined to these.
     narrow = Ranges({"effort": 50.0, "time": 0.6}, {"effort": 51.0, "time": 0.61})
@@ -358,6 +365,7 @@ def test_the_best_that_is_known_stands_where_solves_fail() -> None:
         decide(cart(), MESH, preference, time_limit=1e-9)
 
 
+@pytest.mark.slow
 def test_same_seed_same_bits() -> None:
     preference = ReferencePoint({"effort": 10.0, "time": 0.7})
     one, other = (decide(cart(), MESH, preference, ranges=RANGES, starts=4, seed=5) for _ in range(2))

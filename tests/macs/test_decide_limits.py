@@ -84,6 +84,7 @@ def test_black_boxes_and_other_problems_are_refused() -> None:
         satisfy(cart(), MESH, TIME)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_problem_without_a_feasible_point_says_what_is_violated() -> None:
     problem = two_wells()
     problem.constraint("beyond", problem.parameters["p"], lower=3.0)
@@ -95,6 +96,7 @@ def test_a_problem_without_a_feasible_point_says_what_is_violated() -> None:
     assert "the nearest violates constraint 'beyond'" in choice.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "words"), [(MESH, ""), (None, "no solve converged: ")], ids=["given", "found"])
 def test_where_all_solves_fail_the_message_says_why(monkeypatch: pytest.MonkeyPatch, method: Any, words: str) -> None:
     """From the ends of the front, with boxes of a tenth of the bounds, solves do not reach what is asked for."""

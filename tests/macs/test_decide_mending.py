@@ -111,6 +111,7 @@ def best_time(preference: Preference) -> float:
     return minimize_scalar(lambda T: stage.numbers(np.array([[end(T), T]]))[0], bounds=(4.75, 5.05), options={"xatol": 1e-8}).x
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by_value", [True, False], ids=["by value", "in the objectives"])
 @pytest.mark.parametrize(("preference", "T"), WISHES, ids=[repr(one[0]) for one in WISHES])
 def test_the_mended_point_answers_the_preference(monkeypatch, no_work, preference: Preference, T: float, by_value: bool) -> None:
@@ -153,6 +154,7 @@ def test_what_led_nowhere_is_counted_too(monkeypatch, no_work) -> None:
     assert choice.point.verified is False and choice.stats["gradient_solves"] > 20 and choice.stats["verify"] == 1e-3
 
 
+@pytest.mark.slow
 def test_the_same_bits(no_work) -> None:
     one, other = asked(WISHES[0][0]), asked(WISHES[0][0])
     assert one.point.decision.tobytes() == other.point.decision.tobytes()
@@ -166,6 +168,7 @@ def test_a_transcription_that_is_given_is_kept() -> None:
     assert choice.point.verified is None and not again(choice)
 
 
+@pytest.mark.slow
 def test_who_asks_at_the_same_desk_has_it_too(no_work) -> None:
     goals = FuzzySatisfactory({}, ["end", "time"], 0.1)
     choices = [
@@ -192,6 +195,7 @@ def test_where_only_the_objectives_could_be_kept_the_message_says_so(monkeypatch
     assert choice.history[-1].objectives == pytest.approx(choice.objectives) and len(choice.history) == 2
 
 
+@pytest.mark.slow
 def test_points_that_exceed_a_limit_between_nodes_are_moved_inside(no_work) -> None:
     """Bryson and Denham's problem: a height l up to 1/6 takes an effort of 4 / (9 l)."""
     mesh = DFET(6, 3)
@@ -221,6 +225,7 @@ def test_a_skip_entry_is_refined_and_then_moved_inside_its_limits(no_work) -> No
     assert choice.objectives["terminal mass"] >= 64000 and choice.objectives["terminal speed"] >= 5500 and choice.point.defect < 1e-3
 
 
+@pytest.mark.slow
 def test_objectives_are_judged_by_the_ranges_of_what_is_known() -> None:
     """Off by a twentieth of its range is nothing in an objective of a thousand."""
     problem = swing(1000.0)
@@ -253,6 +258,7 @@ QUICK = Nimbus({"end": end(3.6), "time": 3.6}, improve=["end"], until={"time": 4
 """Of which the limit is a time of 4; the end is no worse than it is at 3.6."""
 
 
+@pytest.mark.slow
 def test_a_hard_limit_is_not_given_up_for_an_error_that_is_known() -> None:
     known = _at(5.0)
     choice = decide(swing(), COARSE, QUICK, ranges=BOTH, start=known)
@@ -364,6 +370,7 @@ def test_conditions_of_optimality_are_in_units_or_not_known() -> None:
     assert "is not known" in desk._not_optimal(np.inf) and "inf" not in desk._not_optimal(np.inf)
 
 
+@pytest.mark.slow
 def test_a_solver_on_a_mesh_that_is_given_mends_where_it_is_asked_to():
     """Also the ends of the front, which it finds first."""
     choices = {"even": ReferencePoint(dict(BOTH.best))}

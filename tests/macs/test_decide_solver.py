@@ -58,6 +58,7 @@ def test_what_was_chosen_is_in_the_file(tmp_path):
     assert again.stats["choices"] == front.stats["choices"] and again.stats["ranges"] == WHOLE
 
 
+@pytest.mark.slow
 def test_it_begins_at_a_sweep_or_a_file_or_the_payoff_table(tmp_path):
     ends().save(tmp_path / "ends.nc")
     choices = {"both": WeightedSum(BOTH)}

@@ -45,6 +45,7 @@ def begun(**more: Any) -> Dialogue:
     return Dialogue(front(), cart(), MESH, **more)
 
 
+@pytest.mark.slow
 def test_with_the_problem_choices_are_optima() -> None:
     dialogue = begun()
     first = dialogue.choose()
@@ -120,6 +121,7 @@ def test_alternatives_are_others_about_the_choice() -> None:
             dialogue.take(number)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_alternatives_stay_within_hard_limits() -> None:
     dialogue = begun()
     dialogue.prefer(PhysicalProgramming({"effort": Smaller(5, 6, 7, 8, 12.0), "time": Smaller(0.6, 0.8, 1.0, 1.3, 2.0)}))
@@ -127,6 +129,7 @@ def test_alternatives_stay_within_hard_limits() -> None:
     assert all(one.objectives["effort"] <= 12.0 * (1 + 1e-6) for one in dialogue.alternatives(4))
 
 
+@pytest.mark.slow
 def test_undone_saved_and_gone_on_with(tmp_path: Path) -> None:
     dialogue, path = begun(seed=3), tmp_path / "choice.json"
     dialogue.prefer(HOPED)
@@ -328,6 +331,7 @@ def test_a_front_that_was_not_simulated_is_saved_with_points_that_were(tmp_path:
     assert again.choose().point.verified and not again.front.was_simulated.any() and len(again.known) == 6
 
 
+@pytest.mark.slow
 def test_more_objectives() -> None:
     front = sweep(corners(), MESH, points=15, starts=1)
     dialogue = Dialogue(front, corners(), MESH)

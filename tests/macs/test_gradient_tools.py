@@ -44,6 +44,7 @@ def goddard(method: str = "pascoletti-serafini") -> Front:
 # Against the truth
 
 
+@pytest.mark.slow
 def test_goddard_is_exact_but_where_the_mesh_is_not() -> None:
     front = goddard()
     assert len(front) == 10 and set(front.status) == {"converged"} and not front.message
@@ -64,6 +65,7 @@ def test_goddard_points_are_evenly_spread() -> None:
     assert steps == pytest.approx(np.full(9, 2 / 9), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_both_methods_lie_on_one_curve() -> None:
     one, other = goddard(), goddard("epsilon")
     assert len(other) == 10 and certificates(other).max() < 1e-6
@@ -74,6 +76,7 @@ def test_both_methods_lie_on_one_curve() -> None:
         assert distances(front[late], goddard_reference(8001)).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_point_found_by_limits_is_found_by_descent() -> None:
     problem, mesh = compiled("orbit_rise"), DFET(8, 2)
     limited = sweep(problem, mesh, points=5, method="epsilon", starts=1)
@@ -82,6 +85,7 @@ def test_a_point_found_by_limits_is_found_by_descent() -> None:
     assert fine.stats["failures"] == {} and len(fine) == 101
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["orbit_rise", "orbit_rise_full"])
 def test_orbit_rise_is_what_its_mesh_can_be(name: str) -> None:
     front = sweep(load(name), DFET(30, 1), points=10, starts=1)
@@ -90,6 +94,7 @@ def test_orbit_rise_is_what_its_mesh_can_be(name: str) -> None:
     assert miss.mean() < 5e-5 and miss.max() < 1e-4
 
 
+@pytest.mark.slow
 def test_two_wells_and_their_multipliers() -> None:
     front = sweep(two_wells(), MESH, points=5)
     p = np.array([point.parameters["p"] for point in front])
@@ -98,6 +103,7 @@ def test_two_wells_and_their_multipliers() -> None:
     assert certificates(front).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_three_objectives_fill_their_triangle() -> None:
     front = sweep(corners(), MESH, points=15, starts=1)
     p = np.array([list(point.parameters.values()) for point in front])
@@ -115,6 +121,7 @@ def test_a_front_of_peaks() -> None:
     assert len(front) == 5 and thrust == pytest.approx(16 / time**4, rel=1e-6) and certificates(front).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_control_that_goes_round() -> None:
     front = sweep(compass(), MESH, points=5, starts=2)
     assert np.linalg.norm(front.objectives, axis=1) == pytest.approx(2, abs=1e-8)
@@ -152,10 +159,12 @@ def test_ends_of_smooth_fronts_are_not_rounded_off() -> None:
     assert ends.objectives == pytest.approx(np.array([[0, 1], [0.5, 0]]), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_three_ends() -> None:
     assert payoff(corners(), MESH).objectives == pytest.approx(2 * (1 - np.eye(3)), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_optimize_takes_one_objective() -> None:
     point = optimize(load("goddard"), DFET(4, 6), objective="horizontal speed", starts=1)
     assert point.objectives["horizontal speed"] == pytest.approx(0.903889755, abs=1e-6)
@@ -174,6 +183,7 @@ def two_valleys() -> Problem:
     return problem
 
 
+@pytest.mark.slow
 def test_several_starts_find_the_deeper_valley() -> None:
     assert optimize(two_valleys(), MESH, starts=12).parameters["p"] == pytest.approx(-1, abs=1e-2)
     near = optimize(two_valleys(), MESH, start=np.array([[0.9]]), starts=1)
@@ -181,12 +191,14 @@ def test_several_starts_find_the_deeper_valley() -> None:
     assert optimize(two_valleys(), MESH, start=np.array([[0.9], [-0.95]])).parameters["p"] == pytest.approx(-1, abs=1e-2)
 
 
+@pytest.mark.slow
 def test_a_guess_is_the_first_start() -> None:
     problem = two_valleys()
     problem.guess(p=-0.9)
     assert optimize(problem, MESH).parameters["p"] == pytest.approx(-1, abs=1e-2)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits_and_the_costs() -> None:
     one, two = (sweep(shuttle(), MESH, points=4, starts=2, seed=3) for _ in range(2))
     assert np.array_equal(one.decision, two.decision) and one.stats["seed"] == 3
@@ -216,6 +228,7 @@ def unreachable() -> Problem:
     return problem
 
 
+@pytest.mark.slow
 def test_the_message_if_nothing_converges() -> None:
     point = optimize(unreachable(), MESH, starts=2)
     assert point.status in ("infeasible", "failed") and point.violation > 1e-3

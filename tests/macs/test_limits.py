@@ -105,6 +105,7 @@ def test_a_program_is_not_built_any_more():
         Watched("one", {"x": x, "f": x**2}, ipopt_options(1.0, 10))
 
 
+@pytest.mark.slow
 def test_a_search_that_is_cut_within_solves_goes_on_to_the_same_bits(tmp_path):
     def solve(**more):
         return MACS(agents=3, archive=3).solve(load("goddard"), DFET(8, 6), evaluations=24, seed=1, inner="ipopt", verify=None, **more)
@@ -146,6 +147,7 @@ def test_they_are_not_built_to_the_end(method, built, monkeypatch):
     assert solved.status == "timeout" and solved.clocked and not solved.begun
 
 
+@pytest.mark.slow
 def test_a_time_limit_ends_them_on_a_fine_mesh():
     nlp = DFET(600, 6).transcribe(load("orbit_rise"))
     start = nlp.first_guess(nlp.lower[nlp.free][None])[0]
@@ -269,6 +271,7 @@ def test_tools_end_in_time(tool):
     assert found.stats["stopped"] == "time limit" and not found.stats["reproducible"] and (len(found) or found.message)
 
 
+@pytest.mark.slow
 def test_mesh_refinement_ends_in_time():
     front = sweep(load("goddard"), DFET(3, 2), points=6, verify=None)
     with within(BOUND):
@@ -435,6 +438,7 @@ def test_an_interrupted_solve_that_has_nothing_leaves_nothing(tmp_path, monkeypa
     assert said.err.endswith("macs solve: nothing was evaluated yet: interrupted\n") and not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", ["goddard", "betts"])
 def test_an_interrupted_solve_saves_what_there_is(tmp_path, problem):
     call = [sys.executable, "-m", "runs.cli", "solve", problem, "--evaluations", "10000000", "--out", str(tmp_path / "front.nc")]

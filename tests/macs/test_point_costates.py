@@ -29,6 +29,7 @@ def ascents() -> Front:
     return sweep(load("goddard"), parse("dfet:6x6"), points=9, starts=1)
 
 
+@pytest.mark.slow
 def test_weights_are_the_slope_of_the_front(ascents):
     """Against the closed form of the front, by differences of its greatest speed."""
     for point in ascents[1:]:
@@ -84,6 +85,7 @@ def test_the_optimum_of_one_objective_has_weight_one():
     assert point.weights == {"flight time": pytest.approx(1.0), "horizontal speed": 0.0}
 
 
+@pytest.mark.slow
 def test_points_of_a_search_have_them():
     front = MACS(agents=5, archive=5, mesh="fixed").solve(load("goddard"), parse("dfet:4x6"), evaluations=600, seed=1)
     assert all((point.costates is None) == (point.optimality > 1e-3) for point in front)
@@ -152,6 +154,7 @@ def test_switching_functions_change_sign_where_controls_do(name, switches):
 # Where there are none.
 
 
+@pytest.mark.slow
 def test_points_that_are_not_optimal_have_none():
     front = MACS(agents=5, archive=5, refine=False, mesh="fixed").solve(load("goddard"), parse("dfet:4x4"), evaluations=200, seed=1)
     assert all(point.costates is point.hamiltonian is point.weights is None for point in front)
@@ -251,6 +254,7 @@ def test_a_state_may_be_called_hamiltonian(tmp_path):
     assert loaded.to_xarray("run")["costate_hamiltonian"].attrs["long_name"] == "Hamiltonian"
 
 
+@pytest.mark.slow
 def test_a_mesh_of_its_own_and_two_meshes_in_one_file(tmp_path):
     fine = optimize(load("standard/car"), starts=1).alone()
     coarse = optimize(load("standard/car"), parse("multiple-shooting:12"), starts=1).alone()
@@ -259,6 +263,7 @@ def test_a_mesh_of_its_own_and_two_meshes_in_one_file(tmp_path):
     assert all(same(*two) for two in zip(front, Front.load(tmp_path / "front.nc"), strict=True))
 
 
+@pytest.mark.slow
 def test_a_picture_shows_them_below(ascents):
     axes = ascents[3].plot(costates=True)
     names, units = zip(*(" ".join(ax.get_ylabel().split()).split(" [") for ax in axes[5:]), strict=True)
@@ -288,6 +293,7 @@ def test_the_objective_that_was_asked_for_is_certified_by_itself_if_it_can_be(mo
     assert min(found["costates"][0].weights) > 0.0
 
 
+@pytest.mark.slow
 def test_the_command_line_names_the_weights(ascents, tmp_path, capsys):
     ascents.save(tmp_path / "front.nc")
     assert main(["show", str(tmp_path / "front.nc"), "--point", "3", "--plot", str(tmp_path / "flight.png")]) == 0

@@ -114,6 +114,7 @@ def test_the_table_has_every_class() -> None:
     assert found == set(METHODS.values()) == set(EVERY)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", EVERY, ids=lambda kind: kind.__name__)
 def test_round_trip(kind: type[Preference]) -> None:
     @settings(max_examples=60, deadline=None)
@@ -249,6 +250,7 @@ plain = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_anything_else_is_refused_or_read(data: st.DataObject) -> None:

@@ -44,6 +44,7 @@ def samples(function: PreferenceFunction) -> np.ndarray:
     return np.unique(np.concatenate([np.linspace(low, high, 60) for low, high in pairwise(wide)]))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(MANY)
 def test_exact_and_equal_at_boundaries(classes):
@@ -76,6 +77,7 @@ def test_monotone_and_positive(classes):
             assert values[-1] > values[len(values) // 2] > values[0]
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(MANY)
 def test_once_continuously_differentiable(classes):

@@ -203,6 +203,7 @@ def test_a_table_shows_the_best_points_first():
     assert none.splitlines()[-1] == "No point meets all hard limits; none has time at most 1 s."
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("m", [1, 2, 3, 5])
 @pytest.mark.parametrize("n", [1, 9])
 def test_figures_of_any_number_of_objectives(m, n):
@@ -219,6 +220,7 @@ def test_figures_of_any_number_of_objectives(m, n):
     assert ("not feasible or not verified" in ax.get_legend_handles_labels()[1]) == (n > 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "preference",
     [

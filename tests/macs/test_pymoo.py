@@ -97,6 +97,7 @@ def finished(algorithm: MACS) -> np.ndarray:
 # The same search
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
@@ -123,6 +124,7 @@ def test_the_paper_is_the_same_too():
     assert np.array_equal(ordered(res.F), ordered(front.objectives)) and len(res.history) == res.algorithm.n_gen - 1
 
 
+@pytest.mark.slow
 def test_a_preference_guides_as_it_does_macs():
     wish = ReferencePoint({"f1": 0.2, "f2": 0.6})
     front = macs.MACS(prefer=wish).minimize(get_problem("zdt1"), evaluations=900, seed=1)
@@ -139,6 +141,7 @@ def test_without_a_budget_it_is_the_search_without_one():
     assert np.array_equal(res.F, seen[-1]) and res.algorithm.n_gen == 14
 
 
+@pytest.mark.slow
 def test_known_fronts_are_found():
     res = minimize(get_problem("zdt1"), MACS(archive=20), ("n_eval", 10_000), seed=1)
     x = np.linspace(0, 1, 2001)
@@ -162,6 +165,7 @@ def test_one_objective_gives_one_point_as_pymoo_does():
     assert res.X.shape == (10,) and res.F.shape == (1,) and res.F[0] < 1e-4
 
 
+@pytest.mark.slow
 def test_equality_constraints_are_met_as_pymoo_asks():
     res = minimize(Equality(), MACS(), ("n_eval", 3_000), seed=1)
     assert len(res.F) > 5 and (np.abs(res.H) <= 1e-4).all() and (res.CV == 0).all()
@@ -213,6 +217,7 @@ def test_the_budget_that_a_termination_has():
     assert most_evaluations(DefaultMultiObjectiveTermination(), default=False) == np.inf
 
 
+@pytest.mark.slow
 def test_other_terminations_end_a_run():
     res = minimize(get_problem("zdt1"), MACS(), ("n_gen", 4), seed=1)
     assert res.algorithm.n_gen == 5 and res.algorithm.evaluator.n_eval < 400
@@ -320,6 +325,7 @@ def test_evaluators_of_the_users_own_are_used():
 # Copies
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda algorithm: pickle.loads(pickle.dumps(algorithm))])
 @pytest.mark.parametrize("name", ["zdt1", "bnh"])
 def test_copies_in_the_middle_go_on_to_the_same_points(copied, name):
@@ -398,6 +404,7 @@ def test_an_interrupt_loses_no_evaluation():
 # Ask and tell
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["zdt1", "bnh", "sphere"])
 def test_ask_and_tell_give_the_same_points(name):
     expected, problem = ready(get_problem(name)), get_problem(name)
@@ -414,6 +421,7 @@ def test_ask_and_tell_give_the_same_points(name):
     assert generations == list(range(1, expected.n_gen)) and algorithm.n_gen == expected.n_gen and algorithm.evaluator.n_eval == 600
 
 
+@pytest.mark.slow
 def test_values_may_be_computed_elsewhere():
     problem = Problem(n_var=2, n_obj=2, n_ieq_constr=1, xl=np.zeros(2), xu=np.ones(2))
     algorithm = MACS().setup(problem, termination=NoTermination(), seed=1)
@@ -427,6 +435,7 @@ def test_values_may_be_computed_elsewhere():
     assert len(res.F) == 10 and np.abs(res.F.sum(axis=1) - 1).max() < 1e-3 and 0.79 < res.X[:, 0].max() <= 0.8
 
 
+@pytest.mark.slow
 def test_told_individuals_may_have_moved():
     problem = get_problem("zdt1", n_var=3)
     algorithm = ready(problem, ("n_eval", 900))
@@ -517,6 +526,7 @@ def test_where_all_fails_there_is_no_result():
     assert res.F is None
 
 
+@pytest.mark.slow
 def test_where_nothing_is_feasible_the_least_infeasible_point_is_returned_if_asked_for():
     res = minimize(Nowhere(), MACS(), ("n_eval", 1_000), seed=1)
     assert res.X is None and len(res.algorithm.opt) == 1

@@ -12,6 +12,7 @@ from problems import load
 from transcription import DFET
 
 
+@pytest.mark.slow
 def test_lambda_is_raised_until_the_order_is_kept() -> None:
     choice = satisfy(cart(), MESH, FuzzySatisfactory({}, ["time", "effort"], 0.02), ranges=RANGES, start=ends())
     assert [step.about["lambda"] for step in choice.history] == pytest.approx([0.02, 0.04, 0.08, 0.16][: len(choice.history)])
@@ -35,6 +36,7 @@ STEEP = Ranges({"effort": -1e4, "time": 0.5}, {"effort": 96.0, "time": 4.03})
 """Ranges in which a whole second is worth next to no effort: lambda would have to be within 1e-4 of 1/2 until the effort comes first."""
 
 
+@pytest.mark.slow
 def test_the_order_is_imposed_where_lambda_does_not_do() -> None:
     choice = satisfy(cart(), MESH, FuzzySatisfactory({}, ["effort", "time"]), ranges=STEEP, start=ends())
     T = brentq(lambda T: (12 / T**3 + 1e4) / 10_096 - (T - 0.5) / 3.53, 0.5, 4.0, xtol=1e-12)
@@ -48,6 +50,7 @@ def test_the_order_is_imposed_where_lambda_does_not_do() -> None:
     assert choice.point.optimality < 1e-6
 
 
+@pytest.mark.slow
 def test_an_order_that_no_point_keeps_is_named() -> None:
     # All efforts are in the worse half of their range, all times in the better tenth.
     ranges = Ranges({"effort": -100.0, "time": 0.5}, {"effort": 96.0, "time": 40.0})
@@ -61,6 +64,7 @@ def test_an_order_that_is_a_limit_from_the_first() -> None:
     assert len(choice.history) == 1 and choice.objectives["time"] == pytest.approx(DIAGONAL, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_goddard_keeps_both_orders() -> None:
     for order in (["flight time", "horizontal speed"], ["horizontal speed", "flight time"]):
         choice = satisfy(load("goddard"), DFET(4, 6), FuzzySatisfactory({}, order, 0.01))

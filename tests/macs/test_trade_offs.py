@@ -107,6 +107,7 @@ def test_units_and_scales_of_variables_do_not_matter():
     assert other.rates == pytest.approx(plain.rates, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_mesh_does_not_matter():
     """Where the optimum is no polynomial."""
     found = [trade_offs(optimum(carts(slope=0.8), method, 2.0, 1.5)[0]).matrix for method in (DFET(6, 5), *MESHES)]
@@ -114,6 +115,7 @@ def test_the_mesh_does_not_matter():
         assert one == pytest.approx(found[0], rel=5e-3)
 
 
+@pytest.mark.slow
 def test_where_controls_are_on_their_bounds_the_mesh_matters_by_an_element():
     """At both ends of the flight; how much of it is not held is known to about an element."""
     methods = [DFET(20, 3), DFET(20, 3, basis="bernstein"), parse("radau:24x3"), parse("shooting:60:linear"), parse("shooting:60")]
@@ -320,6 +322,7 @@ def ascents() -> Front:
     return sweep(load("goddard"), parse("dfet:6x6"), points=12, method="epsilon", starts=1)
 
 
+@pytest.mark.slow
 def test_rates_are_the_slope_of_the_front_in_closed_form(ascents):
     for point in ascents[2:]:
         time = point.objectives["flight time"]
@@ -505,6 +508,7 @@ def test_weights_that_are_zero():
 # Without the problem, and where there is nothing to say.
 
 
+@pytest.mark.slow
 def test_a_file_has_the_rates_and_says_what_the_matrix_needs(tmp_path):
     problem = carts()
     front = sweep(problem, parse(MESH), points=10, verify=None, starts=1)
@@ -538,6 +542,7 @@ def test_what_has_no_trade_offs(ascents):
             trade_offs(ascents[3]).rate(0, wrong)
 
 
+@pytest.mark.slow
 def test_a_choice_knows_what_it_costs():
     """Of the weighted sum of objectives in ranges, the rates follow from the weights."""
     ranges = Ranges(best={"flight time": 109.0, "horizontal speed": 0.9}, worst={"flight time": 250.0, "horizontal speed": 0.0})
@@ -580,6 +585,7 @@ def test_pictures_of_points(ascents):
     axes[0].figure.draw_without_rendering()
 
 
+@pytest.mark.slow
 def test_pictures_of_fronts(ascents):
     above, below = plot_rates(ascents)
     assert below.get_xlabel() == "\N{LEFTWARDS ARROW} flight time [s]" and below.get_yscale() == "log"

@@ -68,6 +68,7 @@ def test_solve_and_minimize_are_one_search():
     assert other.source is None and not other.was_simulated.any()
 
 
+@pytest.mark.slow
 def test_every_search_solves_it():
     for solver in (NSGA3(), MOEAD(population=20), MOPSOCD(particles=20), SMSEMOA(population=20), RVEA(), CTAEA(population=20)):
         found = solver.solve(parabolas(), evaluations=300, seed=1)
@@ -81,6 +82,7 @@ def test_rows_beyond_the_budget_are_those_of_the_fingerprint_and_those_evaluated
     assert counted.rows == 200 + 8 + found.stats["evaluated_again"] == 208 + len(found)
 
 
+@pytest.mark.slow
 def test_the_truss_is_found_to_its_closed_form():
     found = MACS(archive=20).solve(load("four_bar_truss"), seed=1)
     truth = four_bar_truss.reference()
@@ -216,6 +218,7 @@ def test_choices_are_made_from_known_points(front):
     assert "black box has no derivatives" in dialogue.choose().message
 
 
+@pytest.mark.slow
 def test_a_preference_guides_it():
     wish = ReferencePoint({"near": 0.3, "nearness": -2.0})
     even, guided = (MACS(prefer=prefer).solve(parabolas(), evaluations=2000, seed=3) for prefer in (None, wish))

@@ -48,5 +48,6 @@ def test_others_stay_as_they_are(expr):
     assert factor == 1.0 and term is expr
 
 
+@pytest.mark.slow
 def test_a_sum_of_thousands_of_terms_is_no_obstacle():
     assert len(absolute_terms(sum((U * k for k in range(5000)), ca.fabs(X)))) == 2

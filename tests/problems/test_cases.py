@@ -26,6 +26,7 @@ def test_the_longest_ascent_has_the_speed_of_the_literature():
     assert goddard.reference(points=3)[-1] == pytest.approx([250.0, 0.903889755358877], rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tf", [110.0, 120.0, 150.0, 190.0, 250.0])
 def test_the_closed_form_is_the_linear_tangent_law_simulated(tf):
     """tan u = c0 - c1 t, its two constants by shooting, simulated by scipy."""

@@ -27,6 +27,7 @@ def test_least_effort_is_that_of_an_optimal_flight():
         assert best.objectives["effort"] == pytest.approx(landing_site.least_effort(*site), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_front_of_one_is_that_of_a_scan_of_the_ground():
     axis = np.linspace(-1.0, landing_site.REACH, 1401)
     x, y = np.meshgrid(axis, axis)
@@ -38,6 +39,7 @@ def test_the_front_of_one_is_that_of_a_scan_of_the_ground():
     assert len(scan) > 300
 
 
+@pytest.mark.slow
 def test_a_team_is_no_better_than_its_members():
     """Random teams of optimal and other members are nowhere below the front of teams."""
     rng = np.random.default_rng(0)

@@ -227,6 +227,7 @@ def flights() -> dict[str, list[Flight]]:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "room"), list(zip(CASES, (case1, case2, case3), strict=True)))
 def test_pictures_show_states_limits_and_zones(case, room, flights, tmp_path):
     pictures = room.plot(flights[case])
@@ -262,6 +263,7 @@ def test_any_data_make_a_problem(data):
     assert np.isfinite(nlp.evaluate(Z)[1]).all()
 
 
+@pytest.mark.slow
 def test_the_default_mesh_follows_commands_that_jump():
     """At the end a hundredth of the altitude's span is left open, of which a thousandth counts."""
     problem = load("reentry_case1")

@@ -80,6 +80,7 @@ def test_the_reference_is_a_front(case):
     assert is_nondominated(front * SIGNS).all()
 
 
+@pytest.mark.slow
 def test_rows_are_flights_within_the_limits(flights):
     case, rows, (objectives, worst, states) = flights
     np.testing.assert_allclose(objectives, rows[:, :4], rtol=1e-3, atol=2e-4)

@@ -170,6 +170,7 @@ def flown(trajectory) -> dict[str, np.ndarray]:
     return ends | {"limits": most}
 
 
+@pytest.mark.slow
 def test_the_nominal_flight_flies():
     """It keeps all limits and leads down to where it should, when flown by code of its own."""
     problem = load("smv")
@@ -188,6 +189,7 @@ def test_the_nominal_flight_flies():
     assert np.max([np.array(in_the_air(y)[3]) / [200, 13406.4583, 2.5] for y in found.y.T]) < 1.0
 
 
+@pytest.mark.slow
 def test_pictures_show_commands_and_limits(tmp_path):
     nlp = stated(load("smv").default_transcription).transcribe(load("smv"))
     Z = nlp.propagate(nlp.first_guess(nlp.guess[None]))

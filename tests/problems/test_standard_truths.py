@@ -245,6 +245,7 @@ def test_the_largest_orbit():
     assert value("orbit_raising") == pytest.approx(end(shot(missed, [2.0, 1.0, 2.0]))[0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_oscillator_with_a_limited_control():
     def end(w):
         def rates(_, s):
@@ -257,6 +258,7 @@ def test_the_oscillator_with_a_limited_control():
     assert value("van_der_pol") == pytest.approx(end(shot(lambda w: end(w)[3:], [0.8, 4.8]))[2], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_best_temperatures():
     coldest, hottest = np.exp(-2500 / 298), np.exp(-2500 / 398)
 
@@ -295,6 +297,7 @@ ARCS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARCS)
 def test_as_many_arcs_as_conditions(name):
     """Bang-bang extremals with as many arcs as final conditions: their lengths are the roots of these."""

@@ -90,6 +90,7 @@ def test_passages_side_by_side():
     assert "at least 200 times as fast" in passages.report(rows)
 
 
+@pytest.mark.slow
 def test_inner_levels_side_by_side():
     rows: list[Row] = []
     inner.bench_inner(rows, TINY, SMALL)
@@ -174,6 +175,7 @@ def test_a_front_that_is_as_good():
     assert as_good(np.delete(front, 15, axis=0), front) and not as_good(front + 0.01, front) and not as_good(front[:0], front)
 
 
+@pytest.mark.slow
 def test_a_guided_search_beside_an_even_one():
     rows: list[Row] = []
     prefer.bench_prefer(rows, (1, 2), True, (replace(prefer.CASES[0], evaluations=3000),))
@@ -216,6 +218,7 @@ def test_controls_that_turn_round(values, expected):
     assert density.turns(nlp.unpack(vector)["run"]) == expected
 
 
+@pytest.mark.slow
 def test_published_problems_each_in_its_own_process():
     rows: list[Row] = []
     standard.bench_standard(rows, standard.Effort(("moon_landing",)))
@@ -229,6 +232,7 @@ def test_published_problems_each_in_its_own_process():
     assert all(len(line) <= 150 for line in text.splitlines())
 
 
+@pytest.mark.slow
 def test_what_does_not_end_or_crashes_is_told(capfd):
     rows: list[Row] = []
     standard.bench_standard(rows, standard.Effort(("moon_landing",), limit=0.05))
@@ -372,6 +376,7 @@ sys.exit(main(["bench", "inner", "--quick"]))
 """
 
 
+@pytest.mark.slow
 def test_in_a_process():
     code = SCRIPT.format(here=str(Path(__file__).parent))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)

@@ -173,6 +173,7 @@ def indicators(rows: list[Row]) -> list[tuple]:
     return [(row.case, row.who, row.values["igd"], row.values["volume"]) for row in rows]
 
 
+@pytest.mark.slow
 def test_a_small_contest():
     rows: list[Row] = []
     Contest("constrained").bench(rows, 2, 300, ("MW1",), jobs=2)
@@ -191,6 +192,7 @@ def two_rivals(monkeypatch):
         monkeypatch.setattr(module, "the_set", lambda name: replace(whole(name), rivals=("NSGA-II", "NSGA-III")))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_rivals")
 def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys):
     first: list[Row] = []
@@ -219,6 +221,7 @@ def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys
     assert f"searches in {folder.name} are of other code" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_rivals")
 def test_only_some_solvers(tmp_path):
     """Then nothing is judged, and a later call makes the others: the seeds are the same."""
@@ -232,6 +235,7 @@ def test_only_some_solvers(tmp_path):
     assert [row.who for row in all_of_them] == list(cases.solvers_of("zdt")) and indicators(all_of_them[:1]) == indicators(alone)
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_the_seeds_that_all_have_finished(tmp_path):
     """As after Ctrl-C: seed 2 of one solver is missing."""
     functions = [cases.zdt(1)]
@@ -256,6 +260,7 @@ def test_a_folder_of_other_things_is_refused(tmp_path, capsys, monkeypatch):
     assert "contains no study but other things, 'letter.txt' for one" in err and "Traceback" not in err
 
 
+@pytest.mark.slow
 def test_a_search_that_fails_is_no_result(tmp_path):
     """A function of exactly so many rows as a problem's fingerprint needs."""
     function = cases.Function("fails", lambda: (methodcaller("reshape", 8, 2), [(0, 1)] * 2), 2, 200, 100)

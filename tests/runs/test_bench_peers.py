@@ -18,6 +18,7 @@ def test_peers_that_are_missing_are_named(monkeypatch: pytest.MonkeyPatch) -> No
     assert "not installed" not in peers.report([Row("isoperimetric", peers.OURS)])
 
 
+@pytest.mark.slow
 def test_ours_is_measured_alone_where_no_peer_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(peers, "find_spec", lambda name: None)
     rows: list[Row] = []

@@ -96,6 +96,7 @@ def test_the_command(capsys, monkeypatch):
     assert "scale" in command.KINDS
 
 
+@pytest.mark.slow
 def test_generations_grow_as_their_work_does():
     def prepare(size: int):
         def run(generations: int) -> None:

@@ -235,6 +235,7 @@ def folder(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_the_page_of_a_study_has_its_runs_measures_tables_and_failures(folder):
     store = Store.open(folder, trust=True)
     reader = Reader(study_page(store))
@@ -261,6 +262,7 @@ def test_the_page_of_a_study_has_published_tables_and_its_note(folder):
     assert data["note"] == "Two of each." and any("A. Author" in one["caption"] for one in data["tables"])
 
 
+@pytest.mark.slow
 def test_the_command_writes_pages_and_refuses_what_is_wrong(folder, tmp_path, capsys):
     flights(3).save(tmp_path / "front.nc")
     assert main(["report", str(tmp_path / "front.nc")]) == 0

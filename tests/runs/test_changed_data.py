@@ -101,6 +101,7 @@ def test_shifts_are_those_of_the_same_flights(folder, changed):
     assert float(told["limited"]["distance: mean shift [m]"]) == 0
 
 
+@pytest.mark.slow
 def test_points_one_by_one_and_the_best_of_each_front(folder, changed):
     points = rows(changed, "changed-data-points")
     assert len(points) == 4 * 3 and {row["point"] for row in points} == {f"point {k}" for k in (1, 2, 3, 4)}
@@ -131,6 +132,7 @@ def test_a_panel_for_each_data(folder, changed):
         np.testing.assert_allclose(np.sort(lines["found under these data"], axis=0), np.sort(union(folder, problem).objectives, axis=0))
 
 
+@pytest.mark.slow
 def test_of_many_objectives_a_row_for_each_data(tmp_path):
     (tmp_path / "cart.py").write_text(CART, encoding="utf-8")
     address = f"{tmp_path / 'cart.py'}:cart"
@@ -166,6 +168,7 @@ def test_the_report_has_all_of_it(folder):
     assert "representative solutions of the front" in said
 
 
+@pytest.mark.slow
 def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_path):
     def stated(least: float) -> Problem:
         problem = glide()

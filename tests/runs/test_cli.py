@@ -166,6 +166,7 @@ def test_shooting_is_solved_shown_and_verified(capsys, method, exceeded):
     assert f"simulated, it violates {exceeded}" in out if exceeded else "FAILS" not in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["radau:2x3", "gauss:1x6", "lobatto:2x2:1", "chebyshev:1x6:bernstein"])
 def test_collocation_is_solved_shown_and_verified(capsys, method):
     call = ["solve", "glide.py:build", "--transcription", method, "--seed", "1", "--out", "collocated.nc"]
@@ -180,12 +181,14 @@ def test_an_unknown_method_shows_how_all_are_written(capsys):
     assert "unknown transcription 'radeau:2x3'" in said and "radau:10x4" in said and "dfet:4x6" in said and len(said.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_search_on_shooting_is_polished_on_dfet(capsys):
     call = ["solve", "glide.py:build", "--transcription", "shooting:6", "--evaluations", "60", "--polish-on", "dfet:4x3", "--seed", "1"]
     assert main([*call, "--out", "polished.nc"]) == 0 and "DFET" in capsys.readouterr().out
     assert main(["verify", "polished.nc", "--trust"]) == 0
 
 
+@pytest.mark.slow
 def test_points_are_simulated_and_those_that_miss_are_told(capsys):
     """That is no failure of `solve`, but `verify` says no."""
     call = ["solve", "glide.py:rough", "--evaluations", "40"]
@@ -200,6 +203,7 @@ def test_points_are_simulated_and_those_that_miss_are_told(capsys):
     assert main(["verify", "rough.nc", "--problem", "glide.py:rough", "--tolerance", "0.5"]) == 0
 
 
+@pytest.mark.slow
 def test_points_that_miss_are_mended(capsys):
     assert main(["solve", "glide.py:rough", "--evaluations", "40", "--seed", "1", "--out", "mended.nc"]) == 0
     out = capsys.readouterr().out
@@ -207,6 +211,7 @@ def test_points_that_miss_are_mended(capsys):
     assert main(["verify", "mended.nc", "--problem", "glide.py:rough"]) == 0
 
 
+@pytest.mark.slow
 def test_verify_says_how_much_points_may_miss(capsys):
     call = ["solve", "glide.py:rough", "--mesh", "fixed", "--evaluations", "40", "--seed", "1", "--out", "front.nc"]
     for words, problem, expected in (([], "forgiving", 0.5), (["--verify", "0.7"], "forgiving", 0.7), (["--verify", "0.5"], "rough", 0.5)):
@@ -223,6 +228,7 @@ def test_verify_says_how_much_points_may_miss(capsys):
         assert "--verify" in wrong(capsys, *call, "--verify", word)
 
 
+@pytest.mark.slow
 def test_show_says_what_the_simulation_of_a_point_found(capsys):
     call = ["solve", "glide.py:rough", "--mesh", "fixed", "--evaluations", "40", "--seed", "1"]
     assert main([*call, "--out", "rough.nc", "--plot", "rough.png"]) == 0
@@ -316,6 +322,7 @@ def test_a_wrong_call_in_a_process(here):
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_gradient_tools_found(capsys, monkeypatch):
     """They evaluate no candidates, which is no sign of nothing found."""
     solve, interrupted = MultistartSolver.from_vector, []
@@ -346,6 +353,7 @@ def test_ctrl_c_and_kill_keep_what_was_found(here, number):
     assert Front.load("front.nc").stats["stopped"] == "interrupted"
 
 
+@pytest.mark.slow
 def test_data_go_to_the_function_and_stay_with_the_front(capsys):
     assert main(["solve", "glide.py:build", "--data", "speed=2.5", "--evaluations", "40", "--seed", "1", "--out", "slow.nc"]) == 0
     front = Front.load("slow.nc")
@@ -357,6 +365,7 @@ def test_data_go_to_the_function_and_stay_with_the_front(capsys):
     assert Front.load("choice.nc").source.data == {"speed": 2.5}
 
 
+@pytest.mark.slow
 def test_a_front_is_the_start_of_a_search_with_other_data(capsys, monkeypatch):
     assert main(["solve", "glide.py:build", "--evaluations", "40", "--seed", "1", "--out", "front.nc"]) == 0
     begun = []
@@ -384,6 +393,7 @@ def test_data_and_starts_that_are_none_are_refused_in_a_line(capsys):
     assert "does not hold a front" in wrong(capsys, "solve", "glide.py:build", "--start", "glide.py")
 
 
+@pytest.mark.slow
 def test_a_time_limit_ends_a_search_with_its_front(capsys):
     assert main(["solve", "goddard", "--evaluations", "10000000", "--time-limit", "3", "--out", "front.nc"]) == 0
     assert "ended early (time limit)" in capsys.readouterr().out
@@ -406,6 +416,7 @@ def test_kill_leaves_no_handler(capsys):
     assert main(["list"]) == 0 and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
+@pytest.mark.slow
 def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, monkeypatch):
     call = ["solve", "glide.py:build", "--evaluations", "150", "--seed", "1"]
     assert main([*call, "--out", "whole.nc"]) == 0
@@ -440,6 +451,7 @@ def test_show_prints_draws_and_exports(saved, capsys):
     assert Path("a.pdf").read_bytes().startswith(b"%PDF") and Path("a.csv").read_text().startswith("point,flight time [s],")
 
 
+@pytest.mark.slow
 def test_show_one_point(saved, capsys):
     path = str(saved[0] / "front.nc")
     assert main(["show", path, "--point", "-1", "--plot", "b.png", "--costates", "--csv", "b.csv"]) == 0
@@ -454,6 +466,7 @@ def test_show_one_point(saved, capsys):
     assert "there is no point 99: the front has points 0 to" in wrong(capsys, "show", path, "--point", "99")
 
 
+@pytest.mark.slow
 def test_verify_says_which_point_fails_and_why(saved, capsys):
     path = str(saved[0] / "front.nc")
     assert main(["verify", path, "--tolerance", "10"]) == 0
@@ -464,6 +477,7 @@ def test_verify_says_which_point_fails_and_why(saved, capsys):
     assert "belongs to problem 'goddard'" in wrong(capsys, "verify", path, "--problem", "orbit_rise")
 
 
+@pytest.mark.slow
 def test_a_cut_file_is_one_line(saved, capsys):
     whole = (saved[0] / "front.nc").read_bytes()
     Path("cut.nc").write_bytes(whole[: len(whole) // 2])

@@ -58,6 +58,7 @@ def folder(tmp_path_factory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_captions_name_a_problem_that_has_an_address_by_its_own_name(folder):
     comparison = comparisons(Store.open(folder), {})[0]
     addressed = replace(comparison, problem="brakes.py:build")
@@ -65,6 +66,7 @@ def test_captions_name_a_problem_that_has_an_address_by_its_own_name(folder):
     assert replace(comparison, problem="heavy").name == "heavy, dfet:1x2", "a label that somebody chose"
 
 
+@pytest.mark.slow
 def test_only_points_that_are_feasible_when_simulated_count(folder):
     """What a solver says of its objectives decides on `verified`, but those of the simulation count."""
     comparison = comparisons(Store.open(folder), {})[0]
@@ -88,6 +90,7 @@ def test_only_points_that_are_feasible_when_simulated_count(folder):
     assert counts[0] > counts[1] >= counts[2] > 0, "some of them lie"
 
 
+@pytest.mark.slow
 def test_runs_of_old_are_simulated_by_the_report(folder, tmp_path):
     """Their fronts have no columns of a simulation, and those of another tolerance do not count either."""
     shutil.copytree(folder, tmp_path / "out")
@@ -144,6 +147,7 @@ def test_published_ends_and_feasibility_beside_ours(folder):
     assert "macs, dfet:1x2" not in rows, "it has no population"
 
 
+@pytest.mark.slow
 def test_without_flights_points_are_what_the_solver_says(tmp_path):
     given = study(verify=None)
     given.run(tmp_path / "out", executor=Inline())
@@ -164,6 +168,7 @@ def test_points_whose_flights_are_lost_are_simulated_again_if_their_problem_is_f
         study().report(tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_a_flight_that_fails_costs_no_run(tmp_path, monkeypatch, caplog):
     def fails(front, tolerance):
         raise RuntimeError("no air")

@@ -42,6 +42,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_by_options(fronts: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     call = ["decide", str(fronts / "goddard.nc"), "--reference", "flight time=150", "--improve", "horizontal speed", "--to", "0.7 km/s"]
     files = ["--out", "choice.nc", "--json", "choice.json", "--plot", "choice.png"]
@@ -83,6 +84,7 @@ def test_a_preference_from_a_file_and_alternatives(fronts: Path, here: Path, cap
     assert "No point meets all hard limits" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_problem_that_is_not_at_hand(fronts: Path, capsys: pytest.CaptureFixture[str]) -> None:
     front = str(fronts / "mine.nc")
     call = ["decide", front, "--improve", "flight time", "--to", "160"]

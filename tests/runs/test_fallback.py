@@ -99,6 +99,7 @@ def test_a_picture_that_cannot_be_written_costs_nothing_else(disk, monkeypatch, 
     assert "front saved in front.nc" in said.out and len(Front.load("front.nc")) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="limits of processes are those of Unix")
 def test_a_limit_to_the_size_of_files_is_one_line(disk):
     code = (

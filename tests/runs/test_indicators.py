@@ -175,6 +175,7 @@ def test_dominated_points_of_a_reference_do_not_count():
     assert gd(LINE, cloud) == 0.0 and igd(LINE, cloud) == igd(LINE, LINE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [goddard, orbit_rise])
 def test_fronts_against_what_the_user_sees(case):
     """A Front knows its senses: the speed and the energy are maximised, and a reference beside it is as the user has it."""

@@ -47,6 +47,7 @@ def test_other_errors_are_not_for_want_of_memory(tmp_path, monkeypatch):
         main(["solve", "four_bar_truss"])
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_process_is_one_line(tmp_path):
     """The problem's own function asks for more than the process may have: 4 GB within 3."""
     (tmp_path / "hungry.py").write_text(

@@ -65,6 +65,7 @@ def test_a_page_has_tables_pictures_and_where_they_are_from(place, capsys):
     assert len(pictures) == 2 and all((place / one).read_bytes().startswith(b"\x89PNG") for one in pictures)
 
 
+@pytest.mark.slow
 def test_no_page_of_a_study_that_has_changed_or_is_not_finished(place, capsys):
     file, page = place / "small.toml", place / "small.md"
     page.unlink(missing_ok=True)
@@ -139,6 +140,7 @@ def test_work_on_transcriptions_of_different_kinds_is_compared_by_instructions(t
     assert charge(polished.cell, stats) == pytest.approx(60 + more, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_unions_hold_only_what_a_simulation_found(place, tmp_path):
     shutil.copytree(place / "out", tmp_path / "out")
     store = Store.open(tmp_path / "out")

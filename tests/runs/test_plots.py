@@ -24,6 +24,7 @@ EMPTY = np.empty((0, 2))
 TRUTH = np.column_stack([np.linspace(1, 3, 201), np.linspace(1.5, 3.5, 201)])
 
 
+@pytest.mark.slow
 def test_nothing_heavy_is_imported_before_it_is_used():
     code = (
         "import sys, runs.report.plots, runs.report.flight_plots, runs.report.comparison_tables\n"
@@ -88,6 +89,7 @@ def test_more_objectives_are_drawn_in_pairs():
         front_figure({"ours": []}, goals=goals[:1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("m", [5, 6])
 def test_panels_of_many_objectives_do_not_fill_the_last_row(m):
     goals = [Objective(f"objective {i} with a name that is longer than a panel is high", "kg") for i in range(m)]
@@ -100,6 +102,7 @@ def test_panels_of_many_objectives_do_not_fill_the_last_row(m):
             assert getattr(text, side) < getattr(ax.bbox, side)
 
 
+@pytest.mark.slow
 def test_long_names_of_solvers_stay_above_their_panels():
     names = [f"the solver of the paper, until it has settled, number {k}" for k in range(3)]
     figure = attainment_figure({name: attainment([foreign(A, GOALS), foreign(B, GOALS)]) for name in names}, goals=GOALS)
@@ -178,6 +181,7 @@ def test_a_legend_is_where_the_layout_puts_it():
         assert (ax.get_legend() is not None) == inside and len(figure.legends) == (not inside)
 
 
+@pytest.mark.slow
 def test_flights_side_by_side_and_the_law(tmp_path):
     front = flights(5)
     chosen = representatives(front, 3)

@@ -13,6 +13,7 @@ from runs.cli.parser import main
 WANTED = WeightedSum({"flight time": 1.0, "horizontal speed": 2.0})
 
 
+@pytest.mark.slow
 def test_a_preference_in_a_study(tmp_path):
     plain = {"solver": "macs", "mesh": "fixed", "prefer": to_dict(WANTED)}
     study = Study("wishes", problems=["goddard"], transcriptions=["dfet:2x3"], solvers={"here": plain}, evaluations=20, runs=1, seed=1)
@@ -23,6 +24,7 @@ def test_a_preference_in_a_study(tmp_path):
         Study("wishes", problems=["goddard"], solvers={"here": {"solver": "macs", "prefer": {"method": "Wishes"}}}, runs=1, seed=1)
 
 
+@pytest.mark.slow
 def test_a_preference_on_the_command_line(tmp_path, capsys):
     wish, out = tmp_path / "wish.json", tmp_path / "front.nc"
     wish.write_text(json.dumps(to_dict(WANTED)))

@@ -193,6 +193,7 @@ def test_what_has_not_changed_is_not_sent_again(out):
         assert json.loads(client.ask("/data.json", Accept_Encoding="gzip").content) == json.loads(first.content)
 
 
+@pytest.mark.slow
 def test_a_study_that_grows_is_followed_and_finished_runs_are_not_read_again(out, monkeypatch):
     with served(out, trust=True) as client:
         before = client.json("/data.json")
@@ -322,6 +323,7 @@ def test_progress_that_is_old_or_damaged_is_none(tmp_path):
     assert not path.exists()
 
 
+@pytest.mark.slow
 def test_a_study_says_how_it_proceeds_and_leaves_nothing_of_that_behind(tmp_path, monkeypatch):
     monkeypatch.setattr(progress_module, "EVERY", 0.0)
     told = []
@@ -333,6 +335,7 @@ def test_a_study_says_how_it_proceeds_and_leaves_nothing_of_that_behind(tmp_path
     assert not (tmp_path / "out" / progress_module.FILE).exists()
 
 
+@pytest.mark.slow
 def test_fronts_are_followed_one_alone_and_those_of_a_folder(tmp_path):
     flights(3).save(tmp_path / "first.nc")
     with served(tmp_path / "first.nc") as client:
@@ -390,6 +393,7 @@ def process(*call: str):
         made.wait()
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_server_quietly_and_an_open_address_is_warned_of(out):
     with process(str(out), "--port", "0", "--host", "0.0.0.0") as (server, said):
         assert "http://0.0.0.0:" in said and str(out) in said

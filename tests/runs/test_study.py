@@ -216,6 +216,7 @@ def test_what_was_killed_or_late_is_made_again_and_what_crashed_if_asked(trouble
     assert [type(one) for one in asked] == [Crashing, Hanging, Hungry, Dying] and stamps(folder) == before
 
 
+@pytest.mark.slow
 def test_damaged_and_missing_files_are_told_and_made_again(made, tmp_path):
     first = study().run(tmp_path / "out", executor=Inline())
     expected = numbers(first)
@@ -238,6 +239,7 @@ def test_damaged_and_missing_files_are_told_and_made_again(made, tmp_path):
     assert {key: value[0] for key, value in numbers(again).items()} == {key: value[0] for key, value in expected.items()}
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_costs_nothing_that_is_finished(tmp_path, monkeypatch):
     import runs.batch.store as store
 
@@ -260,6 +262,7 @@ def test_a_full_disk_is_told_and_costs_nothing_that_is_finished(tmp_path, monkey
     assert study().run(tmp_path / "out", executor=Inline()).finished == 3 and before.items() <= stamps(tmp_path).items()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damaged", [False, True])
 def test_a_run_goes_on_where_it_was(tmp_path, damaged):
     batch = study(solvers={"faltering": Faltering(folder=str(tmp_path))}, runs=1, evaluations=200)

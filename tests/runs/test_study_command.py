@@ -47,6 +47,7 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_run_resume_and_status(capsys):
     assert main(["study", "run", "gliders.toml", "--trust", "--runs", "1"]) == 0
     said = capsys.readouterr()
@@ -64,6 +65,7 @@ def test_run_resume_and_status(capsys):
     assert "contains no study but other things" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_runs_of_some_solvers(capsys):
     Path("two.toml").write_text(TOML + '[solvers.other]\nsolver = "macs"\nrefine = false\n')
     command = ["study", "run", "two.toml", "--trust", "--runs", "1", "--solvers"]
@@ -130,6 +132,7 @@ def test_a_wrong_call_is_one_line(here, capsys, call, words):
     assert code == 2 and words in said.err and said.err.count("\n") == 1 and not (here / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
 def test_ctrl_c_and_kill_say_how_to_go_on(here, number):
     (here / "gliders.toml").write_text(TOML.replace("60", "2_000_000"), encoding="utf-8")
@@ -168,6 +171,7 @@ def test_each_study_there_is_makes_sense_whole_and_quick(name):
     assert (study.name, study.quick().name) == (name, f"{name}-quick") and study.description == studyfile.describe(name)
 
 
+@pytest.mark.slow
 def test_studies_of_the_parameters_of_the_reentry(capsys):
     assert main(["list"]) == 0
     said = capsys.readouterr().out

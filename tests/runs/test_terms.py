@@ -40,6 +40,7 @@ def test_a_budget_of_its_own_for_each_problem():
     assert all(cell.terms["evaluations"] == cell.evaluations for cell in made.cells if cell.solver == "macs"), "others' do not matter"
 
 
+@pytest.mark.slow
 def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
     assert study().run(tmp_path / "out", executor=Inline()).finished == 6
     found = comparisons(Store.open(tmp_path / "out"), {})
@@ -154,6 +155,7 @@ def bare(problem: Problem, **more) -> Study:
     return Study("bare", **{"problems": problem, "solvers": {"plain": Plain()}, "runs": 1, "seed": 1} | more)
 
 
+@pytest.mark.slow
 def test_a_study_that_says_nothing_does_as_the_command_line_does(tmp_path):
     (run,) = bare(narrow()).run(tmp_path / "own", executor=Inline()).runs
     (plain,) = bare(glide(most=6.0)).run(tmp_path / "plain", executor=Inline()).runs
@@ -226,6 +228,7 @@ def test_a_reference_is_held_against_the_problems_before_any_run(tmp_path):
             study(reference=given)
 
 
+@pytest.mark.slow
 def test_a_transcription_of_its_own_may_be_a_label_of_the_study(tmp_path):
     words = {"coarse": "dfet:2x2", "fine": DFET(3, 2, control_order=0), "unused": "dfet:9x9"}
     given = {"macs": {"transcription": "coarse"}, "nsga2": {"transcription": "fine"}}

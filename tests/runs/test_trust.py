@@ -92,6 +92,7 @@ def test_the_catalogue_needs_no_trust():
     assert not any(map(is_catalogued, ADDRESSES))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ADDRESSES)
 def test_a_run_file_runs_no_code_of_its_own(mark, out, capsys, address):
     path = next(out.rglob("*.nc"))

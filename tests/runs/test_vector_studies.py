@@ -118,6 +118,7 @@ _of_a_script.__module__ = "__main__"
 # The command line
 
 
+@pytest.mark.slow
 def test_the_command_line_solves_shows_verifies_and_chooses(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["solve", "welded_beam", "--evaluations", "600", "--seed", "1", "--out", "beam.nc", "--plot", "beam.png"]) == 0

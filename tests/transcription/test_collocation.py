@@ -447,6 +447,7 @@ def test_one_polynomial_that_newtons_method_cannot_find_is_a_status(points):
     assert set(found.status) <= {"failed", "infeasible"} and (found.violation > 1.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [Collocation(1, 12, points="chebyshev"), Collocation(3, 4), Collocation(2, 5, points="gauss")], ids=str)
 def test_searches_are_solved_saved_and_loaded(method, tmp_path):
     front = MACS(mesh="fixed").solve(load("goddard"), method, evaluations=150, seed=1)
@@ -472,6 +473,7 @@ def test_meshes_are_refined_until_a_simulation_agrees(points):
     assert refined.objectives["cost"] == pytest.approx(2.8672610452, rel=1e-6), "by the maximum principle"
 
 
+@pytest.mark.slow
 def test_edges_move_to_the_switches():
     """Minimum time of the ascent is bang-bang, in closed form 109.10894511799619."""
     coarse = optimize(load("goddard"), Collocation(4, 4), objective="flight time", verify=None, starts=1)

@@ -61,6 +61,7 @@ def test_every_inner_level_makes_candidates_feasible():
         assert (inner_solver(inner).solve(nlp, candidates(nlp, 4)).violation <= 1e-6).all(), inner
 
 
+@pytest.mark.slow
 def test_gradient_tools_searches_and_mesh_refinement_work_on_it():
     problem, truth = load("goddard"), reference(2001)
     assert payoff(problem, METHOD, starts=1).objectives == pytest.approx(truth[[0, -1]], rel=1e-3, abs=1e-3)

@@ -253,6 +253,7 @@ def test_the_first_costate_is_the_slope_of_the_optimum(name, method):
     assert phase["x"][0] == pytest.approx(slope, rel=2e-2 if name == "mixed" else 2e-3, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_what_path_constraints_on_controls_do_is_spread():
     """Backward, they make costates bend and not jump: about as near to the polynomials of the method as the square of the steps."""
     away = []
@@ -368,6 +369,7 @@ def two_legs(parts: int) -> Problem:
     return problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [(f"{w}:15x4", f"{w}:10x4") for w in ("gauss", "radau", "lobatto", "chebyshev")]

@@ -61,6 +61,7 @@ def test_a_search_that_propagates_goes_on_without(little):
     assert front.stats["evaluations"] == 40 and front.stats["gradient_solves"] == 0
 
 
+@pytest.mark.slow
 def test_ten_thousand_nodes_are_propagated():
     nlp = SingleShooting(10_000).transcribe(load("goddard"))
     found = Propagate().solve(nlp, middle(nlp))

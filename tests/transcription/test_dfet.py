@@ -35,6 +35,7 @@ def test_the_sizes_are_those_of_the_paper():
     assert len(DFET(30, 1).transcribe(load("orbit_rise")).free) == 61
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
 @pytest.mark.parametrize(("elements", "order"), [(1, 0), (3, 0), (2, 1), (3, 2), (1, 4), (2, 6), (1, 9)])
 def test_it_is_the_gauss_legendre_implicit_runge_kutta_method(basis, elements, order):

@@ -218,6 +218,7 @@ def test_a_constant_control_that_the_phase_does_not_have_is_refused():
         DFET(2, 2, mesh={"swing": (EDGES, 3, 2, MOVING, {"w": (0,)})}).transcribe(oscillator())
 
 
+@pytest.mark.slow
 def test_searches_begin_with_their_edges_and_files_keep_them(tmp_path):
     method = DFET(2, 2, mesh={"run": ((0, 0.5, 1), 2, 0, (1,))})
     problem = least_time()

@@ -152,6 +152,7 @@ def test_unpacking_takes_values_back_exactly():
     assert phase.edge_states[0].tolist() == [0, 0, 0, 0] and phase.edge_states[-1, 2] == 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "control_order"), [(2, 2), (2, 5), (1, 8), (3, 6)])
 def test_states_between_nodes_are_as_accurate_with_controls_of_a_higher_order(order, control_order):
     """x'' = -x from (1, 0): the error between the nodes is that of the collocation polynomial, of order l + 2, whatever the quadrature."""

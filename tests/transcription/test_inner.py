@@ -233,6 +233,7 @@ print(found.z.tobytes().hex())
 """
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_same_bits():
     from pathlib import Path
 
@@ -247,6 +248,7 @@ def test_settings_that_make_no_sense(wrong):
         Ipopt(**wrong)
 
 
+@pytest.mark.slow
 def test_a_time_limit_gives_a_timeout():
     nlp = DFET(20, 6).transcribe(load("goddard"))
     found = Ipopt(seconds=1e-6).solve(nlp, candidates(nlp, 2))
@@ -335,6 +337,7 @@ class Bisection(InnerSolver):
         return InnerResult(Z, F, worst, status, np.linalg.norm(C - candidates, axis=1), np.ones(len(C), dtype=int))
 
 
+@pytest.mark.slow
 def test_a_users_own_inner_solver_is_as_good_as_ours():
     front = MACS(agents=4, archive=4).solve(hop(), DFET(2, 1), evaluations=120, seed=1, inner=Bisection())
     assert len(front) > 0 and front.violation.max() <= 1e-6

@@ -80,6 +80,7 @@ def test_what_propagation_leaves_is_what_the_nlp_says():
     assert outside == pytest.approx(nlp.evaluate(propagated.Z)[1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_warm_solves_agree_with_the_projection():
     nlp = DFET(4, 6).transcribe(load("goddard"))
     W = Ipopt().solve(nlp, candidates(nlp, 20)).z
@@ -94,6 +95,7 @@ def test_warm_solves_agree_with_the_projection():
     assert auto.fallbacks == 0 and np.array_equal(auto.z, fast.z)
 
 
+@pytest.mark.slow
 def test_cold_solves_agree_with_the_projection():
     """But for the few whose nearest point is not found in time, or has a rival as near."""
     nlp = DFET(4, 6).transcribe(load("goddard"))
@@ -106,6 +108,7 @@ def test_cold_solves_agree_with_the_projection():
     assert np.array_equal(fast.violation, nlp.evaluate(fast.z)[1])
 
 
+@pytest.mark.slow
 def test_inequalities_paths_and_phases():
     nlp = DFET(3, 2).transcribe(two_phases())
     C = candidates(nlp, 20)
@@ -138,6 +141,7 @@ def test_active_path_constraints_are_met_at_the_nearest_point():
     assert (fast.moved[good] <= 1.05 * exact.moved[good]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
 def test_compiled_functions_give_the_same_bits(monkeypatch):
     problem = load("goddard")

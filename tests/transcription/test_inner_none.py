@@ -76,6 +76,7 @@ def test_profiles_of_states_are_in_time_and_smooth_about_the_guess():
         assert 0.5 < away.std() < 1.5 and np.abs(np.diff(away, axis=1)).max() < 1.5
 
 
+@pytest.mark.slow
 def test_a_population_search_has_the_dynamics_among_its_constraints():
     method = Collocation(2, 3)
     front = NSGA3(population=20).solve(oscillator(), method, evaluations=2_000, seed=1, inner="none", tolerance=0.05, verify=None)

@@ -305,6 +305,7 @@ def test_growth_is_that_of_the_closed_form():
         assert growth(nlp.problem, nlp.unpack(z)) == pytest.approx(max(1.0, np.exp(rate * duration)), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_what_no_simulation_can_follow_is_called_that_and_not_an_error_of_the_mesh():
     nlp, z = _linear(1.0, 60.0)
     verdict = assessed(nlp, z)

@@ -175,6 +175,7 @@ def phase_of(places: np.ndarray, x: np.ndarray, start: float = 0.0, length: floa
     return replace(flight, state=state, state_variables=bounds)
 
 
+@pytest.mark.slow
 @given(st.integers(4, 30), st.floats(-1e4, 1e4), st.floats(1e-2, 1e4), st.floats(1e-6, 1e6))
 @settings(max_examples=40, deadline=None)
 def test_units_of_states_and_time_do_not_matter(cells, start, length, unit):

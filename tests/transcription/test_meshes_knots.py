@@ -134,6 +134,7 @@ def test_two_controls_switch_each_at_its_time(word):
     assert switched(method, problem, found[2][1]) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ["dfet:8x3:bernstein", "dfet:20x3"])
 def test_a_singular_arc_does_not_ring(word):
     problem, product, places, singular = catalyst()

@@ -32,6 +32,7 @@ def started(nlp, seed=0):
     return nlp.first_guess((nlp.lower[nlp.free] + rng.random(len(nlp.free)) * nlp.span[nlp.free])[None])[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 @settings(max_examples=20)
 @given(end=st.floats(0.3, 3.0), seed=st.integers(0, 50))
@@ -46,6 +47,7 @@ def test_what_is_out_of_reach_is_missed_by_least(method, end, seed):
     assert opposing(nlp, solved.z) == ("final value of walk.v",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 @settings(max_examples=20)
 @given(end=st.floats(-0.2, 0.2), seed=st.integers(0, 50))

@@ -181,6 +181,7 @@ def test_derivatives_that_are_no_numbers() -> None:
     assert at(nlp_of(problem), p=0.0) == np.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["skip", "goddard", "reentry_case1"])
 def test_states_may_be_eliminated_or_not(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # Equations at the end are more than determine the states: the saddle point of all of them says the same.

@@ -135,6 +135,7 @@ def test_the_same_solve_gives_the_same_bits() -> None:
     assert np.array_equal(one.z, two.z) and one.iterations == two.iterations and not one.clocked
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10_000), orbits=st.booleans())
 def test_a_guarded_solve_makes_no_objective_worse(seed: int, orbits: bool) -> None:
@@ -311,6 +312,7 @@ def test_calls_that_make_no_sense(reference: list[float], weights: list[float], 
         solve(nlp_of(two_wells()), reference, weights, **more)
 
 
+@pytest.mark.slow
 def test_an_objective_is_not_lost_in_the_scale_of_an_explosion_elsewhere():
     """Shooting into states where exp(25 x) grows without limit: the slopes of the cost over the box have a median of 1e100 or more."""
     problem = load("standard/stirred_tank").compile()

@@ -30,6 +30,7 @@ def power(counts: list[int]) -> float:
     return float(np.log2((third - second) / (second - first)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ALL)
 def test_instructions_and_variables_grow_with_the_mesh(word):
     """From meshes on that are long enough for chains of steps, which are shorter to write than their operations."""
@@ -54,6 +55,7 @@ def test_derivatives_grow_with_the_mesh(word):
         assert power([entries(nlp) for nlp in nlps]) < ASKED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ["dfet:4x3", "radau:4x3", "multiple-shooting:6", "shooting:6"])
 @pytest.mark.parametrize("build", [ride, masses])
 def test_derivatives_grow_with_phases_and_variables(word, build):
@@ -62,6 +64,7 @@ def test_derivatives_grow_with_phases_and_variables(word, build):
         assert power([count(nlp) for nlp in nlps]) < ASKED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["constant", "linear", "spline"])
 def test_controls_by_their_values_are_sparse(kind):
     """The matrix from the values to the steps, and the memory that it takes to make it."""
@@ -76,6 +79,7 @@ def test_controls_by_their_values_are_sparse(kind):
     assert power(entries) < ASKED and power(peaks) < ASKED
 
 
+@pytest.mark.slow
 def test_splines_found_by_parts_are_those_found_at_once():
     """Over more than 512 pieces the weights of nodes far away, which count for nothing, are left out; also where pieces are uneven."""
     rng = np.random.default_rng(0)

@@ -177,6 +177,7 @@ def test_no_step_leads_across_a_node_of_the_controls(intervals, steps, nodes):
     assert intervals * steps <= mesh.steps <= intervals * steps + nodes - 2
 
 
+@pytest.mark.slow
 @given(st.integers(2, 9), st.integers(2, 7), st.sampled_from(KINDS), st.integers(0, 10**6))
 @settings(max_examples=15, deadline=None)
 def test_the_integral_of_a_control_is_exact(nodes, control_nodes, kind, seed):
@@ -276,6 +277,7 @@ def test_bounds_of_states_hold_at_the_nodes():
 # Solving
 
 
+@pytest.mark.slow
 def test_goddard_against_its_closed_form():
     nlp = MultipleShooting(40, control="linear").transcribe(load("goddard"))
     assert all(label in nlp.g_labels for label in ("dynamics of ascent.vx", "final value of ascent.y"))
@@ -383,6 +385,7 @@ def test_a_trajectory_comes_back_as_the_vector_it_was_made_of(method):
     assert nlp.interpolate(nlp.unpack(z)) == pytest.approx(z, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_flights_go_from_one_method_to_another():
     problem = load("goddard")
     start = optimize(problem, DFET(4, 6), objective="horizontal speed", starts=1)
@@ -396,6 +399,7 @@ def test_flights_go_from_one_method_to_another():
     assert again.status == "converged" and again.objectives["horizontal speed"] == pytest.approx(0.9038897, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_front_is_found_saved_and_loaded(tmp_path):
     method = SingleShooting(11, control="linear")
     front = MACS(agents=4, archive=4).solve(load("goddard"), method, evaluations=30, seed=1)

@@ -96,6 +96,7 @@ def test_derivatives_of_the_reduced_problem(kind, nodes):
         assert np.allclose(A[:, :, k], slope, atol=2e-8), nlp.variables[column].name
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.floats(0.02, 1.0), min_size=1, max_size=8),
     st.integers(1, 3),
@@ -149,6 +150,7 @@ def test_each_phase_has_a_mesh_of_its_own():
     assert (flight["second"].state.edges - flight["second"].t0) / (2.0 - flight["second"].t0) == pytest.approx(EDGES, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_optimum_of_the_ascent_on_other_intervals(tmp_path):
     """Linear tangent steering at 250 s: 0.903889755358877 km/s, a closed form."""
     edges = tuple((0.5 * (np.linspace(0, 1, 41) + np.linspace(0, 1, 41) ** 2)).tolist())

@@ -130,6 +130,7 @@ def test_profiles_at_many_places_take_memory_in_proportion() -> None:
 SOLVERS = [MACS(agents=4, archive=6), NSGA2(population=8), MOPSO(particles=8)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
 def test_every_solver_begins_with_them(solver, monkeypatch) -> None:
     from macs.evaluation.bilevel import Bilevel

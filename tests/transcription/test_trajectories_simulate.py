@@ -384,6 +384,7 @@ def planned(nlp, x0: float, tf: float) -> Trajectory:
     return nlp.unpack(nlp.propagate(nlp.first_guess(np.array(C)))[0])
 
 
+@pytest.mark.slow
 def test_several_are_simulated_as_each_is_alone():
     nlp = DFET(4, 4).transcribe(oscillator())
     flights = [nlp.unpack(z) for z in nlp.propagate(nlp.first_guess(candidates(nlp, 6)))]
@@ -398,6 +399,7 @@ def test_several_are_simulated_as_each_is_alone():
         np.testing.assert_allclose(check.trajectory["swing"].states, alone.trajectory["swing"].states, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_one_that_breaks_down_takes_no_other_with_it():
     nlp = DFET(2, 3).transcribe(bursting())
     cases = [(0.2, 2.0), (1.0, 1.8), (0.5, 1.0), (0.9, 2.0), (0.3, 1.5)]
@@ -409,6 +411,7 @@ def test_one_that_breaks_down_takes_no_other_with_it():
             assert not np.isfinite(check.objectives["area"]) and check.max_defect == np.inf and check.violation == np.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Radau", "LSODA"])
 def test_several_by_an_implicit_method(method):
     nlp = DFET(4, 4).transcribe(oscillator())

@@ -87,6 +87,7 @@ class Foreign(InnerSolver):
         return InnerResult(found.z, found.F, found.violation, found.status, found.moved, found.iterations)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inner", ["propagate", "auto", Foreign()], ids=["propagate", "auto", "own"])
 def test_those_of_a_trajectory_are_what_its_point_tells(inner) -> None:
     nlp = DFET(2, 3).transcribe(load("orbit_rise"))

@@ -216,6 +216,7 @@ def test_zdt(kind) -> None:
         assert 50 <= len(front) <= 100
 
 
+@pytest.mark.slow
 def test_inside_the_box_it_is_better_than_mopso_cd() -> None:
     """The fronts of ZDT lie on bounds, where pymoo's particles stick."""
     function, bounds, truth = zdt(1)
@@ -235,6 +236,7 @@ def test_the_paper_s_settings() -> None:
     assert MOPSO.paper(cells=10) == MOPSO(**common, cells=10, one_leader=True, settled=0.01)
 
 
+@pytest.mark.slow
 def test_a_search_ends_when_the_mean_of_the_front_has_settled(tmp_path) -> None:
     bounds, limit = [(-4.0, 4.0)], 200_000
     loose = MOPSO(particles=20, settled=0.05).minimize(schaffer, bounds, evaluations=limit, seed=1)

@@ -69,6 +69,7 @@ def test_failed_members_have_no_part_in_the_ranges_of_objectives() -> None:
 # AGE-MOEA-II
 
 
+@pytest.mark.slow
 def test_a_front_whose_points_are_all_equal_is_no_model() -> None:
     pytest.importorskip("numba")
     state = last(AGEMOEA2(population=12), lambda X: np.round(spheres(np.round(X[:, :1]))), 240)

@@ -134,6 +134,7 @@ def test_so_are_fronts() -> None:
     assert front.stats["reproducible"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("m", [2, 3])
 @pytest.mark.parametrize(
     "settings",
@@ -283,6 +284,7 @@ def test_interrupted_on_dtlz2_they_still_equal_pymoo(settings: Any) -> None:
     assert np.array_equal(state.members.F, truth.pop.get("F"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [NSGA2(population=8), NSGA3(divisions=15), MOEAD(divisions=9), MOPSOCD(particles=20, archive=12), MOPSO(particles=20), *SMALL[6:]],
@@ -421,6 +423,7 @@ def test_on_the_lunar_ascent_in_numpy() -> None:
     assert distance_to_curve(state.archive.F, reference() * [1, -1]).mean() < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [SMALL[1], SMALL[2]], ids=named)
 def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
     problem, mesh = load("goddard"), DFET(2, 4)

@@ -135,6 +135,7 @@ def test_trajectories_interpolate_as_before(tmp_path):
         assert same(before.trajectory["coast"].at(times)["h"], after.trajectory["coast"].at(times)["h"])
 
 
+@pytest.mark.slow
 def test_the_file_is_self_describing(tmp_path):
     flights(3).save(tmp_path / "front.nc")
     root = xarray.open_dataset(tmp_path / "front.nc", engine="h5netcdf")
@@ -162,6 +163,7 @@ def test_the_file_is_self_describing(tmp_path):
     assert climb["state_coefficients"].sel(state="v").dims == ("point", "element", "state_function")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FRONTS)
 def test_every_array_has_a_name_and_a_unit_and_is_that_of_to_xarray(tmp_path, name):
     front = FRONTS[name]()
@@ -191,6 +193,7 @@ def test_names_that_netcdf_does_not_allow_are_changed():
     assert group_names(["ascent", "status", "_closest"]) == {"ascent": "ascent", "status": "phase_status", "_closest": "phase__closest"}
 
 
+@pytest.mark.slow
 def test_states_may_have_any_name(tmp_path):
     names = ["element", "node", "a/b", "height [km]", "state_element", "_FillValue"]
     problem = problems.Problem("names")
@@ -885,6 +888,7 @@ def test_files_whose_points_were_judged_by_nothing_are_refused(wrong, tmp_path):
         Front.load(tmp_path / "front.nc")
 
 
+@pytest.mark.slow
 def test_a_phase_may_have_the_name_of_anything_in_the_file(tmp_path):
     problem = problems.Problem("names")
     phase = problem.phase("point", t0=0, tf=(1, 2))

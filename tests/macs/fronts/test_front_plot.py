@@ -121,6 +121,7 @@ def test_parallel_coordinates_end_where_verified_points_do():
     assert black_box(3, 4).plot().get_legend() is None
 
 
+@pytest.mark.slow
 def test_long_names_and_messages_stay_within_the_picture():
     names = [f"expected economic loss number {k} due to floods" for k in range(5)]
     front = black_box(4, 5, goals=[Objective(name, "M$") for name in names])
@@ -148,6 +149,7 @@ def test_given_axes_are_used_and_style_does_not_leak():
     assert {k: v for k, v in matplotlib.rcParams.items() if before[k] != v} == {}
 
 
+@pytest.mark.slow
 def test_a_point_is_drawn_with_all_it_has():
     point = flights()[1]
     axes = point.plot()

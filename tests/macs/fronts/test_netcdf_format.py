@@ -66,6 +66,7 @@ def objects(content: bytes) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FRONTS)
 def test_a_file_has_what_h5netcdf_writes(name: str) -> None:
     groups = dict(files._datasets(FRONTS[name]()))

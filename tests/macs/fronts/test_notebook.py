@@ -87,6 +87,7 @@ def test_of_many_points_not_all_are_rows():
     assert len(cells(page)) == 2 + 30 and "170 more points" in "".join(page.itertext())
 
 
+@pytest.mark.slow
 def test_a_point_is_its_objectives_and_a_picture():
     front = marked(flights(3), [True, False, True])
     page = shown(front[1])
@@ -109,6 +110,7 @@ def test_a_trajectory_has_a_line_for_each_quantity():
     assert np.corrcoef(heights, flight["climb"]["h"])[0, 1] > 0.999, "up is more"
 
 
+@pytest.mark.slow
 def test_words_of_the_user_are_escaped():
     goals = [Objective(EVIL, EVIL), Objective("b", "")]
     front = black_box(3, 2, goals=goals, variables=[Variable(f"{EVIL}{k}", 0.0, 1.0, EVIL) for k in range(3)], message=EVIL)
@@ -129,6 +131,7 @@ def test_two_dollars_make_no_mathematics():
     assert re.sub(r"\\\$", "$", ax.get_xlabel()) == "← price in $ [$]"
 
 
+@pytest.mark.slow
 def test_a_study_and_its_state_are_tables(tmp_path):
     study = Study("small", problems=["four_bar_truss"], solvers={EVIL: NSGA2(population=8)}, evaluations=40, runs=2, seed=1)
     assert cells(shown(study))[1] == ["four_bar_truss", "no transcription", EVIL, "40", "2"]

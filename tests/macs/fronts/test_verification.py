@@ -35,6 +35,7 @@ def altered(front: Front, **changes) -> Front:
     return Front(**columns)
 
 
+@pytest.mark.slow
 def test_an_honest_front_verifies(front, tmp_path):
     checks = verify(front, tolerance=1.0)
     assert len(checks) == len(front) > 0 and all(check.ok for check in checks)
@@ -43,6 +44,7 @@ def test_an_honest_front_verifies(front, tmp_path):
     assert verify(Front.load(tmp_path / "front.nc"), tolerance=1.0) == checks
 
 
+@pytest.mark.slow
 def test_simulations_are_compared_to_the_tolerance(front):
     """A point fails where it ends farther away than the tolerance, and none does below the least that any is away."""
     away = [check.defect for check in verify(front, tolerance=1.0)]
@@ -92,6 +94,7 @@ def test_what_cannot_be_verified_says_why(front):
         verify(altered(front, transcriptions=other), tolerance=1.0)
 
 
+@pytest.mark.slow
 def test_objectives_that_only_the_mesh_believes_are_found():
     """An integrand that oscillates faster than the quadrature sees: states are exact, so only a simulation of the objectives tells."""
     problem = problems.Problem("ripple")

@@ -59,10 +59,12 @@ def test_what_no_solve_came_to_stays_what_it_is(rough, tmp_path):
     assert np.array_equal(rough.polished(FINE, solves=0).F, rough.F)
 
 
+@pytest.mark.slow
 def test_the_same_bits_again(rough, smooth):
     assert np.array_equal(rough.polished(FINE, solves=50).F, smooth.F)
 
 
+@pytest.mark.slow
 def test_it_begins_from_what_is_nearest_to_feasible_where_nothing_is(rough):
     lost = NSGA2(population=12).solve(load("goddard"), SingleShooting(40), evaluations=12, seed=1, inner="propagate")
     assert not len(lost) and lost.closest is not None

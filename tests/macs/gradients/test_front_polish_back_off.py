@@ -49,6 +49,7 @@ def share(front: Front) -> np.ndarray:
     return simulated[:, 0] / (4 / (9 * simulated[:, 1]))
 
 
+@pytest.mark.slow
 def test_points_hold_at_a_price_that_is_small(rough, monkeypatch):
     solved = []
     monkeypatch.setattr(front_polish, "back_off", lambda *arguments: (solved.append(back_off(*arguments)), solved[-1])[1])
@@ -141,6 +142,7 @@ def test_without_a_terminal_not_every_solve_is_shown(rough, capsys):
 class TestOfASearch:
     """MACS searches on one transcription and polishes on another."""
 
+    @pytest.mark.slow
     def test_it_is_the_polished_front_of_the_search(self, rough):
         solver = MACS(polish_on="dfet:3x3", polish_every=20)
         found = solver.solve(bryson_denham(), SHOOTING, evaluations=400, seed=1, inner="projection", verify=VERIFY)
@@ -149,6 +151,7 @@ class TestOfASearch:
         assert np.array_equal(found.verified, expected.verified) and found.was_simulated.all()
         assert found.solver["settings"]["polish_on"] == "dfet:3x3" and found.stats["evaluations"] == 400
 
+    @pytest.mark.slow
     def test_a_finished_checkpoint_is_polished_again(self, tmp_path):
         solver = MACS(polish_on="dfet:3x3", polish_every=40)
         problem, kept = bryson_denham(), tmp_path / "kept"

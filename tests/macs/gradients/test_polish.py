@@ -88,6 +88,7 @@ def test_a_polish_fills_empty_places() -> None:
     assert len(state.archive) == 6
 
 
+@pytest.mark.slow
 def test_no_more_solves_than_allowed() -> None:
     evaluator = Circle()
     state = state_of(evaluator, np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)]))
@@ -306,6 +307,7 @@ def test_every_point_is_a_certified_optimum_of_the_mesh(name, mesh, reference, e
     assert front.stats["evaluations"] <= evaluations and 0 < front.stats["gradient_solves"] <= evaluations // 20
 
 
+@pytest.mark.slow
 def test_a_point_moved_off_the_front_is_far_from_optimal() -> None:
     front = MACS(mesh="fixed").solve(load("goddard"), DFET(4, 6), evaluations=200, seed=1)
     nlp = DFET(4, 6).transcribe(load("goddard"))
@@ -319,6 +321,7 @@ def test_a_point_moved_off_the_front_is_far_from_optimal() -> None:
         assert optimality(nlp, found.z[0], np.ptp(front.F, axis=0)) > 1e-3
 
 
+@pytest.mark.slow
 def test_without_refinement_nothing_is_certified_and_no_gradient_used() -> None:
     front = MACS(refine=False).solve(load("goddard"), DFET(4, 6), evaluations=200, seed=1)
     assert front.stats["gradient_solves"] == 0 and all(point.optimality is None for point in front)

@@ -91,6 +91,7 @@ def test_near_the_best_controls_deviate_in_a_window():
     assert np.mean(np.array(kept) > 0.2) > 0.25 and min(kept) == 0.0 and max(kept) > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deepest", [0, 3])
 def test_the_deepest_of_eight_wells_is_found(deepest):
     depths = [1.0 + (2.0 if k == deepest else 0.1 * (k % 3)) for k in range(8)]
@@ -100,6 +101,7 @@ def test_the_deepest_of_eight_wells_is_found(deepest):
     assert stats["starts"] > stats["optima"] >= 3 and stats["found"] >= 1
 
 
+@pytest.mark.slow
 def test_what_only_one_start_found_is_said():
     """A narrow deep well beside a wide one: how often it was found is in the message, exactly where it was once."""
     seen = set()
@@ -112,6 +114,7 @@ def test_what_only_one_start_found_is_said():
     assert seen == {True, False}
 
 
+@pytest.mark.slow
 def test_a_front_to_start_from_is_never_made_worse():
     """A first solve from a good point may leave its well; the point itself then counts."""
     depths = [1.0, 1.1, 3.0, 1.2, 1.0, 1.3, 1.1, 1.0]
@@ -121,6 +124,7 @@ def test_a_front_to_start_from_is_never_made_worse():
     assert again.F[0, 0] <= best.F[0, 0] + 1e-9 and again.F[1, 1] <= best.F[1, 1] + 1e-9
 
 
+@pytest.mark.slow
 def test_a_sweep_with_one_start_and_with_as_many_as_pay_agree_where_there_is_one_valley():
     goddard = load("goddard")
     one, many = (sweep(goddard, points=5, starts=starts) for starts in (1, "auto"))

@@ -49,6 +49,7 @@ def test_layers_at_equal_numbers_of_intervals():
     assert errors[1] < 0.03 * errors[0] and errors[1] < 5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "count", "share"), [("van_der_pol", 40, 0.3), ("rayleigh", 40, 0.3)])
 def test_other_states_at_equal_numbers_of_intervals(case, count, share):
     problem = load(f"standard/{case}")
@@ -57,6 +58,7 @@ def test_other_states_at_equal_numbers_of_intervals(case, count, share):
     assert defect(problem, dense) < share * defect(problem, even)
 
 
+@pytest.mark.slow
 def test_elements_of_other_methods_move_too():
     problem = load("standard/van_der_pol")
     even, dense = refined(problem, DFET(20, 2), more=False, limit=2)
@@ -117,6 +119,7 @@ def test_a_search_refines_the_intervals_of_its_points():
     assert max(counts) > 12 and all(point.max_defect < 1e-3 for point in (p.simulate() for p in front))
 
 
+@pytest.mark.slow
 def test_without_a_transcription_the_problems_own_intervals_are_refined():
     problem = swinging()
     problem.default_transcription = "multiple-shooting:12:linear"
@@ -126,6 +129,7 @@ def test_without_a_transcription_the_problems_own_intervals_are_refined():
     assert isinstance(method, MultipleShooting) and method.mesh_of("up").elements > 12
 
 
+@pytest.mark.slow
 def test_splines_that_leave_their_bounds_become_straight_lines():
     problem = swinging((-1.5, 1.5))
     spline = optimize(problem, MultipleShooting(16, control="spline"), objective="time", starts=1)

@@ -46,11 +46,13 @@ def test_other_starts_find_a_better_optimum():
     assert alone.alone().stats["starts"] == 1
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits_from_several_starts():
     one, two = (optimize(load("standard/stirred_tank"), starts=4, seed=4) for _ in range(2))
     assert np.array_equal(one.decision, two.decision)
 
 
+@pytest.mark.slow
 def test_what_no_solve_reached_is_not_called_converged():
     """A way of 2 in a time of 1 at a speed of 1, missed by hardly more than the tolerance of feasibility, is still no optimum."""
     problem = Problem("too far")
@@ -78,6 +80,7 @@ def test_feasible_but_not_optimal_is_not_called_converged():
     assert optimize(problem, starts=1).status == "converged"
 
 
+@pytest.mark.slow
 def test_an_objective_that_is_constant_has_no_scale_of_rounding():
     problem = load("standard/obstacle")
     assert nlp_scales(DFET(8, 3).transcribe(problem.compile())) == pytest.approx([1.0])
@@ -85,6 +88,7 @@ def test_an_objective_that_is_constant_has_no_scale_of_rounding():
     assert point.status == "converged" and point.verified and point.alone().stats["inner_iterations"] < 2000
 
 
+@pytest.mark.slow
 def test_what_is_worse_than_another_mesh_achieved_is_not_good(monkeypatch):
     """Of three attempts the first two are called worse than they are: by errors they would be good."""
     problem = load("standard/bryson_denham").compile()

@@ -85,6 +85,7 @@ def test_without_time_points_are_left_as_they_are(marked):
     np.testing.assert_array_equal(found.F, marked.F)
 
 
+@pytest.mark.slow
 def test_ends_keep_their_places_when_they_are_mended():
     """The first objective is maximised, so that the ends are not in the order of a sorted front; on two elements both miss."""
     problem = Problem("pendulum")
@@ -148,12 +149,14 @@ def test_points_that_exceed_a_limit_by_little_keep_their_mesh():
     assert len(moved) == 3 and {point.transcription["settings"]["mesh"] for point in again} == {None}
 
 
+@pytest.mark.slow
 def test_points_that_were_not_simulated_are_simulated_first():
     front = MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
     assert not front.was_simulated.any() and front.mended().verified.all()
     assert len(front[[]].mended()) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fine", [None, DFET(4, 7)])
 def test_an_empty_front_stays_empty_and_keeps_its_reason(fine):
     front = MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
@@ -161,6 +164,7 @@ def test_an_empty_front_stays_empty_and_keeps_its_reason(fine):
     assert len(nothing) == 0 and nothing.message == "no feasible point" and nothing.stats["verify"] == 1e-3
 
 
+@pytest.mark.slow
 def test_a_fine_mesh_is_for_all_points_and_each_is_simulated_once(monkeypatch):
     """All verified already on the mesh of the search, and solved on the fine one all the same; nothing else is simulated."""
     front = sweep(load("goddard"), DFET(8, 6), points=3, starts=1)

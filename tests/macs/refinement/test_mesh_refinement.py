@@ -44,6 +44,7 @@ def fine(coarse) -> Front:
     return coarse.refine_mesh(limit=4)
 
 
+@pytest.mark.slow
 def test_points_get_near_the_truth_and_are_confirmed_by_simulation(coarse, fine):
     truth = reference(20001)
     before, after = distance_to_curve(coarse.objectives, truth), distance_to_curve(fine.objectives, truth)
@@ -94,6 +95,7 @@ def test_meshes_go_through_files_and_are_verified(tmp_path, fine):
     assert times == pytest.approx([point.trajectory["ascent"].tf for point in fine], rel=1e-14)
 
 
+@pytest.mark.slow
 def test_points_of_different_meshes_merge_and_start_a_search(coarse, fine):
     merged = Front.merge([coarse[3:], fine[:3]])
     assert len(merged) == 5 and len({id(one) for one in merged.transcriptions}) >= 2
@@ -102,6 +104,7 @@ def test_points_of_different_meshes_merge_and_start_a_search(coarse, fine):
         assert (row + 1e-6 * np.ptp(fine.F, axis=0) >= again.F).all(axis=1).any()
 
 
+@pytest.mark.slow
 def test_part_of_a_front_keeps_its_places(coarse):
     """The first of these is the best in flight time of those that are here, but not of all."""
     part = coarse[1:4]
@@ -111,6 +114,7 @@ def test_part_of_a_front_keeps_its_places(coarse):
     assert np.abs(alone.F / coarse[2].F - 1.0).max() < 1e-6 and alone.message.startswith("1 of 1")
 
 
+@pytest.mark.slow
 def test_objectives_without_derivatives_are_solved_by_projection():
     """The largest of a peak has no gradient solve: the feasible point nearest to the old one is taken."""
     problem = Problem("highest")
@@ -128,6 +132,7 @@ def test_objectives_without_derivatives_are_solved_by_projection():
     assert max(after for after, _ in defects) < 1e-6 < max(before for _, before in defects)
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_with_what_there_is(coarse, monkeypatch):
     plain, solved = MeshLoop._solved, []
 

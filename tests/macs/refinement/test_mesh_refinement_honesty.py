@@ -67,6 +67,7 @@ def test_a_front_keeps_its_ends_however_far_a_finer_mesh_moves_them(span):
         assert flown == pytest.approx(point.F.tolist(), rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("span", "transcription"), [(50.0, "dfet:40x3:bernstein:1"), (5.0, "dfet:40x3:bernstein:1"), (50.0, "dfet:20x3")])
 def test_an_optimum_is_only_certified_if_it_is_one(span, transcription):
     """Bounds ten times as wide as needed hide an error that is divided by them; a control of order 1 hides its own suboptimality."""
@@ -136,6 +137,7 @@ def keeps_what_came_in(seed: int) -> None:
 QUICK = (0, 1, 11, 30, 34)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", QUICK)
 def test_random_fronts_keep_what_came_in(seed):
     keeps_what_came_in(seed)
@@ -147,6 +149,7 @@ def test_many_random_fronts_keep_what_came_in(seed):
     keeps_what_came_in(seed)
 
 
+@pytest.mark.slow
 def test_what_no_simulation_can_follow_is_said_to_be_that():
     """x' = x + u over 40 seconds: an error grows by exp(40). The optimum is u = -2 exp(-t), to the last digit: cost 2."""
     problem = Problem("unstable")
@@ -197,6 +200,7 @@ def test_where_solves_fail_in_one_basis_the_other_is_tried(monkeypatch, fails):
     assert fails in tried and found.best.method.basis != fails and found.complaints() == []
 
 
+@pytest.mark.slow
 def test_a_control_of_low_order_gets_what_a_mixed_constraint_needs():
     """On 20 Bernstein elements of linear controls the mixed constraint of Rayleigh's problem costs 8e-4 of the objective."""
     point = optimize(load("standard/rayleigh"), parse("dfet:20x3:bernstein:1"), starts=1)
@@ -244,6 +248,7 @@ def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
     assert found.good and loop.solves.counts.failures
 
 
+@pytest.mark.slow
 def test_work_ends_where_it_is_to_end():
     problem, wanted = layers(1.5, 1.0, 50.0, 50.0), Wanted(1e-6, 1e-6)
     whole, free = searched(problem, wanted)
@@ -254,6 +259,7 @@ def test_work_ends_where_it_is_to_end():
     )
 
 
+@pytest.mark.slow
 def test_programs_of_earlier_meshes_are_not_kept():
     def alive() -> int:
         gc.collect()

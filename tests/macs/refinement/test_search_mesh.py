@@ -48,6 +48,7 @@ def test_a_problem_has_its_own_default_or_a_coarse_mesh():
     assert default_transcription(smooth()) == default_transcription(smooth().compile()) == COARSE
 
 
+@pytest.mark.slow
 def test_a_smooth_problem_keeps_the_coarse_mesh():
     found = found_mesh(smooth().compile(), 1e-3, 1e-6)
     assert found.search == COARSE and found.fine is None and 2 <= found.counts.gradient_solves < 60
@@ -78,6 +79,7 @@ def test_a_search_begins_with_the_optima_of_single_objectives():
     assert front.verified.all() and front.F.min() == pytest.approx(published("two_link_arm")[0].value, rel=5e-4)
 
 
+@pytest.mark.slow
 def test_a_search_keeps_the_ends_that_were_found_for_its_mesh():
     """A few evaluations lead to few points. Least effort in a time T is 12 / T^3, least time 1."""
     problem = smooth()

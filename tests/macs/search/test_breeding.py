@@ -194,6 +194,7 @@ def rippled(X: np.ndarray) -> np.ndarray:
     return 10.0 * (Y**2 + 0.1 * (1.0 - np.cos(20.0 * np.pi * Y))).sum(axis=1, keepdims=True) - 0.2
 
 
+@pytest.mark.slow
 def test_as_long_as_nothing_is_feasible_the_least_violated_points_are_bred():
     """And so violations get smaller than by agents alone, which try all coordinates."""
     bred, alone = (searched(MACS(archive=50, breeding=each), rippled, 20, 8000, 1) for each in (None, 0.0))
@@ -235,6 +236,7 @@ def apart(X: np.ndarray) -> np.ndarray:
     return np.minimum(total - 0.5, 2.0 - total)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_feasible_parts_behind_infeasible_points_are_reached(seed):
     """Through the points outside: they are infeasible, and no point of the archive dominates them."""

@@ -116,6 +116,7 @@ def evaluator(tolerance: float = 1e-6) -> Bilevel:
     return Bilevel(MESH.nlp(swing()), Auto(), tolerance)
 
 
+@pytest.mark.slow
 def test_proposals_keep_their_order():
     box, rng = evaluator(), np.random.default_rng(3)
     state = MACS(agents=4, archive=4).begin(box, 200, rng)
@@ -156,6 +157,7 @@ def test_a_divided_search_goes_on_to_the_same_bits(tmp_path):
     assert np.array_equal(again.F, whole.F) and again.stats["ways"] == whole.stats["ways"]
 
 
+@pytest.mark.slow
 def test_others_use_the_fixed_rule():
     from macs import NSGA2
 

@@ -103,6 +103,7 @@ def test_shares_of_directions():
     assert np.array_equal(one, other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("prefer", "f1"),
     [
@@ -241,6 +242,7 @@ def test_targets_beyond_the_front_leave_the_search_even_and_say_so():
     assert len(front) == 10 and np.ptp(np.diff(front.F[:, 0])) < 0.15
 
 
+@pytest.mark.slow
 def test_limits_that_no_point_meets_are_approached():
     wanted = PhysicalProgramming({"f1": Smaller(0.1, 0.15, 0.2, 0.25, 0.3), "f2": Smaller(0.1, 0.15, 0.2, 0.25, 0.3)})
     front = minimize(wanted)
@@ -296,6 +298,7 @@ def test_gradients_go_where_the_preference_is_good(flights):
     assert guided.objectives[0, 0] < 1.02 * truth[0, 0] and guided.objectives[-1, 0] > 240.0
 
 
+@pytest.mark.slow
 def test_a_guided_search_of_trajectories_goes_on_to_the_same_bits(tmp_path, flights):
     left = iter(range(3))
     for callback in (lambda progress: next(left, None) is None, None):

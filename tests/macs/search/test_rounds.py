@@ -84,6 +84,7 @@ def test_one_objective_is_measured_by_its_size_where_all_that_was_seen_is_alike(
     assert improves(np.array([[-1e-8]]), np.zeros((1, 1)), nearly, only), "of an optimum at 0 what was seen is all there is"
 
 
+@pytest.mark.slow
 def test_one_objective_ends_soon():
     front = MACS().solve(load("standard/car"), seed=1)
     assert front.stats["stopped"] == DONE and front.stats["evaluations"] < 2000
@@ -162,17 +163,20 @@ def test_a_front_is_found_without_a_number():
     assert hypervolume(front, goddard.reference()) > 0.999 * hypervolume(long, goddard.reference())
 
 
+@pytest.mark.slow
 def test_a_function_without_gradients_is_searched_until_it_is_done():
     front = MACS().minimize(vector, [(0.0, 1.0)] * 5, seed=1)
     assert front.stats["stopped"] == "done" and 4000 <= front.stats["evaluations"] < 40_000
     assert np.abs(front.F[:, 1] - (1 - np.sqrt(front.F[:, 0]))).max() < 1e-2
 
 
+@pytest.mark.slow
 def test_objectives_in_no_conflict_end_soon():
     front = MACS().minimize(lambda X: np.stack([X.sum(axis=1), 2 * X.sum(axis=1)], axis=1), [(0.0, 1.0)] * 3, seed=1)
     assert front.stats["stopped"] == "done" and len(front) == 1 and front.F.max() < 1e-3
 
 
+@pytest.mark.slow
 def test_a_ceiling():
     front = replace(SMALL, ceiling=100).solve(walking(), MESH, seed=1, verify=None)
     assert front.stats["stopped"] == "ceiling" and front.stats["evaluations"] == 100 and len(front) == 6
@@ -183,6 +187,7 @@ def test_nothing_feasible_ends_soon():
     assert front.stats["stopped"] == "settled" and "violates path 'place' of 'walk'" in front.message
 
 
+@pytest.mark.slow
 def test_settings_follow_from_no_number_and_numbers_are_spent_in_full():
     front = SMALL.solve(walking(), MESH, evaluations=600, seed=1, verify=None)
     assert front.stats["stopped"] == "budget" and front.stats["evaluations"] == 600 and "rounds" not in front.stats
@@ -200,6 +205,7 @@ def test_a_callback_ends_it():
     assert front.stats["stopped"] == "callback" and len(front) and front.stats["evaluations"] == seen[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solve", [3, 8, 14])
 def test_it_goes_on_to_the_same_bits_from_the_middle_of_a_polish(tmp_path, monkeypatch, solve):
     expected = whole(1)  # before anything is counted
@@ -220,6 +226,7 @@ def test_it_goes_on_to_the_same_bits_from_the_middle_of_a_polish(tmp_path, monke
     assert rest.stats["rounds"] == expected.stats["rounds"] and rest.stats["stopped"] == expected.stats["stopped"] == "done"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("iterations", [1, 10, 20])
 def test_it_goes_on_to_the_same_bits_from_between_iterations(tmp_path, iterations):
     expected, left = whole(2), iter(range(iterations))
@@ -229,6 +236,7 @@ def test_it_goes_on_to_the_same_bits_from_between_iterations(tmp_path, iteration
     assert np.array_equal(rest.F, expected.F) and rest.stats["evaluations"] == expected.stats["evaluations"]
 
 
+@pytest.mark.slow
 def test_a_fruitless_round_is_not_polished(monkeypatch):
     """The second round of `walk` finds nothing beyond its front: the archive stays as the first polish left it."""
     polishes, original = [], module.Rounds.news
@@ -245,6 +253,7 @@ def test_others_need_a_number():
     assert NSGA2(population=10).solve(problem, MESH, verify=None).stats["evaluations"] == 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solve", [2, 9, 25])
 def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_path, monkeypatch, solve):
     """Solve 2 and 9 are of the opening, which begins anew then, since there is no state yet; 25 of a later round."""

@@ -116,6 +116,7 @@ BASELINES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", BASELINES, ids=str)
 @pytest.mark.parametrize("constraints", [None, lambda X: 0.5 - X[:, :1]], ids=["free", "constrained"])
 def test_baselines_go_on_to_the_same_bits(file, solver, constraints) -> None:
@@ -131,6 +132,7 @@ def test_baselines_go_on_to_the_same_bits(file, solver, constraints) -> None:
         file.unlink()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", [NSGA3(divisions=5), MOPSOCD(particles=6), MOPSO(particles=6), CTAEA(divisions=5)], ids=str)
 def test_baselines_go_on_with_a_trajectory_problem(file, solver) -> None:
     solve(solver, 30, checkpoint=file, callback=after(1))
@@ -201,6 +203,7 @@ SOLVES = [1, 9, 38, *(pytest.param(number, marks=pytest.mark.slow) for number in
 """Gradient solves within which a polish is stopped: of the ends, of the places between them, and late."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", SOLVES)
 def test_killed_in_the_polish(file, monkeypatch, number) -> None:
     whole = solved()  # before anything is counted
@@ -213,6 +216,7 @@ def test_killed_in_the_polish(file, monkeypatch, number) -> None:
     assert solving.count == whole.stats["gradient_solves"] - (number - 1)  # that one was not finished
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", SOLVES)
 @pytest.mark.parametrize("kept", [True, False])
 def test_interrupted_in_the_polish(file, monkeypatch, number, kept) -> None:
@@ -229,6 +233,7 @@ def test_interrupted_in_the_polish(file, monkeypatch, number, kept) -> None:
         assert solving.count == whole.stats["gradient_solves"] - number
 
 
+@pytest.mark.slow
 def test_out_of_time_in_the_polish(file, monkeypatch) -> None:
     with monkeypatch.context() as patch:
         late = SimpleNamespace(perf_counter=lambda: time.perf_counter() + 1000.0)
@@ -238,6 +243,7 @@ def test_out_of_time_in_the_polish(file, monkeypatch) -> None:
     assert_same(solve(checkpoint=file), solved())
 
 
+@pytest.mark.slow
 def test_interrupted_time_and_again_in_the_polish(file, monkeypatch) -> None:
     solves = 0
     while True:
@@ -252,6 +258,7 @@ def test_interrupted_time_and_again_in_the_polish(file, monkeypatch) -> None:
     assert_same(front, solved())
 
 
+@pytest.mark.slow
 def test_interrupted_within_the_last_solve(file, monkeypatch) -> None:
     with monkeypatch.context() as patch:
         Solving(patch, solved().stats["gradient_solves"], press)
@@ -262,6 +269,7 @@ def test_interrupted_within_the_last_solve(file, monkeypatch) -> None:
     assert_same(solve(checkpoint=file), solved())
 
 
+@pytest.mark.slow
 def test_interrupted_in_the_polish_of_a_search_that_is_stuck(file, monkeypatch) -> None:
     solver = Stuck(agents=4, archive=6, polish_every=4)
     with monkeypatch.context() as patch:
@@ -272,6 +280,7 @@ def test_interrupted_in_the_polish_of_a_search_that_is_stuck(file, monkeypatch) 
     assert_same(front, solve(solver))
 
 
+@pytest.mark.slow
 def test_what_an_interrupt_cut_short_is_done_again(file, monkeypatch) -> None:
     """Ctrl-C within a batch of IPOPT's solves leaves some of them undone; they must not be taken for failures when the run goes on."""
     settings = {"problem": "goddard", "evaluations": 60, "inner": "ipopt", "solver": MACS(agents=4, archive=6, refine=False)}
@@ -418,6 +427,7 @@ front.save("front.nc")
 """
 
 
+@pytest.mark.slow
 def test_kill_9_in_the_polish(tmp_path) -> None:
     done, again = killed(tmp_path, POLISH, 17)
     left = solved().stats["gradient_solves"] - done

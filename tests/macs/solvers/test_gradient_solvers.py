@@ -20,6 +20,7 @@ def goddard():
     return load("goddard")
 
 
+@pytest.mark.slow
 def test_they_find_what_the_tools_find(goddard):
     for own, tool in (
         (solver("payoff", starts=1), payoff(goddard, METHOD, starts=1)),
@@ -45,6 +46,7 @@ def test_without_an_optimum_the_front_is_empty():
     assert len(front) == 0 and front.closest is not None and "no solve converged" in front.message
 
 
+@pytest.mark.slow
 def test_meshes_follow_on_request(goddard):
     method = parse("multiple-shooting:8:linear")
     fixed, dense = (solver("payoff", starts=1, mesh=mesh).solve(goddard, method, seed=0) for mesh in ("fixed", "density"))
@@ -84,6 +86,7 @@ def test_no_checkpoint_keeps_them():
     assert not keeps(solver("payoff", starts=1))
 
 
+@pytest.mark.slow
 def test_on_the_command_line(tmp_path, capsys):
     assert main(["solve", "goddard", "--solver", "payoff", "--seed", "1", "--out", str(tmp_path / "ends.nc")]) == 0
     assert "2 points" in capsys.readouterr().out

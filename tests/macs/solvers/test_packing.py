@@ -117,6 +117,7 @@ def through_file(value: Any, kind: Any) -> Any:
     return value
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(trees)
 @example(

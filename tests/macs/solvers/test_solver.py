@@ -68,6 +68,7 @@ def test_an_archive_smaller_than_the_objectives() -> None:
         MACS(archive=1).solve(load("goddard"), MESH, evaluations=50)
 
 
+@pytest.mark.slow
 def test_a_callback_sees_progress_and_stops_the_search() -> None:
     seen: list[Progress] = []
 
@@ -90,6 +91,7 @@ def test_a_time_limit_keeps_what_was_found() -> None:
     assert len(front) > 0
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_what_was_found() -> None:
     before = signal.getsignal(signal.SIGINT)
 
@@ -133,6 +135,7 @@ def test_one_evaluation_is_one() -> None:
     assert "MACS, 1 evaluation, " in front.table() and "Made feasible" not in front.table()
 
 
+@pytest.mark.slow
 def test_a_start_is_used_and_never_made_worse() -> None:
     first = MACS(mesh="fixed").solve(compiled("orbit_rise"), MESH, evaluations=300, seed=1)
     again = MACS(mesh="fixed").solve(compiled("orbit_rise"), MESH, evaluations=60, seed=2, start=first)
@@ -152,6 +155,7 @@ def test_a_guess_is_among_the_first() -> None:
     np.testing.assert_allclose(front[0].trajectory["rise"]["u"], 1.5)
 
 
+@pytest.mark.slow
 def test_a_start_of_another_problem_is_refused() -> None:
     other = MACS().solve(compiled("goddard"), DFET(4, 1), evaluations=30, seed=1)
     with pytest.raises(ValueError, match="other variables"):
@@ -169,6 +173,7 @@ def test_a_start_of_another_problem_is_refused_before_a_mesh_is_found(monkeypatc
         MACS().solve(load("orbit_rise"), evaluations=30, start="smoth")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mesh", [MESH, DFET(6, 2)])
 def test_a_front_of_other_data_may_begin_a_search(mesh) -> None:
     def lift(most: float) -> Problem:
@@ -189,6 +194,7 @@ def test_a_front_of_other_data_may_begin_a_search(mesh) -> None:
         MACS().solve(lift(1.0), MESH, evaluations=60, start=before.decision)
 
 
+@pytest.mark.slow
 def test_a_start_of_another_mesh_is_interpolated() -> None:
     coarse = MACS(mesh="fixed").solve(compiled("orbit_rise"), DFET(6, 2), evaluations=300, seed=1, inner="projection")
     fine = MACS(mesh="fixed").solve(compiled("orbit_rise"), DFET(12, 2), evaluations=40, seed=2, start=coarse, inner="projection")
@@ -240,6 +246,7 @@ def test_a_search_goes_on_the_coarse_mesh_where_its_points_are_solved_on_finer_o
     assert begun == [mesh if coarse else fine]
 
 
+@pytest.mark.slow
 def test_what_blows_up_in_a_search_is_no_warning():
     problem = Problem("explosion")
     phase = problem.phase("p", t0=0.0, tf=10.0)

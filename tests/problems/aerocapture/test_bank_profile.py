@@ -103,6 +103,7 @@ def optimum(shape: int, **data):
     return problem, optimize(problem, stated(problem.default_transcription), starts=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [2, 3])
 def test_refined_solutions_flown_again(shape):
     _, point = optimum(shape)

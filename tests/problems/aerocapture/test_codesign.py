@@ -99,6 +99,7 @@ def exit_apoapsis(entry_angle: float, ballistic: float, lift: float) -> float:
     return -MU / (2 * energy) * (1 + np.sqrt(max(1 + 2 * energy * momentum**2 / MU**2, 0.0))) - TARGET
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ballistic", "lift"), [(45.0, 0.32), (120.0, 0.49), (300.0, 0.31), (600.0, 0.72)])
 def test_corridors_against_flights_from_the_entry(ballistic, lift):
     def edge(u: float) -> float:
@@ -115,6 +116,7 @@ def test_the_passage_is_the_boundary_for_its_own_lift():
     np.testing.assert_allclose(boundary(solved.ballistic, solved.lift), solved.entry_angle, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_corridors_all_over_the_range():
     rng = np.random.default_rng(8)
     ballistic, lift = np.exp(rng.uniform(*np.log(BALLISTIC), 40)), rng.uniform(*LIFT_TO_DRAG, 40)

@@ -78,6 +78,7 @@ def test_speeds_that_cannot_be_are_refused(data: dict[str, float], word: str) ->
         load("aerocapture", **data)
 
 
+@pytest.mark.slow
 def test_searches_of_the_paper_s_budget() -> None:
     whole = hypervolume_at(reference(), POINT)
 

@@ -137,6 +137,7 @@ def test_without_dispersion_it_is_the_nominal_passage(number):
     assert anew.upward[0] == pytest.approx(nominal.lift[0], abs=RTOL)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("design", "way"), [(capsule(1), over_a_plain), (capsule(5), over_a_plain), (PROFILED, in_space)])
 def test_cases_flown_by_other_code(design, way):
     """Those that come out, captured or not, to 1e-6; and nothing else is captured or lost."""
@@ -183,6 +184,7 @@ def test_the_farthest_apoapsis_that_counts():
     assert found.measures()["delta v, P99", "m/s"] is None
 
 
+@pytest.mark.slow
 def test_roots_of_other_code():
     design, cases = capsule(3), Dispersions(cases=4, seed=11).draw()
     found = solved_anew(design, cases)
@@ -272,6 +274,7 @@ def test_two_burns():
     assert MARS.target_radius == TARGET
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits():
     """And a case does not depend on the others."""
     settings_ = Dispersions(cases=200, seed=7)

@@ -104,6 +104,7 @@ def test_solve_bvp_finds_the_same(ballistic):
     np.testing.assert_allclose([found.arc[0], found.lift[0], found.entry_angle[0]], [*solved.p, solved.y[2, 0]], rtol=RTOL)
 
 
+@pytest.mark.slow
 def test_300_random_capsules():
     """All that fulfil the paper's limits are captured, each solved by itself."""
     rng, left = np.random.default_rng(18), 300
