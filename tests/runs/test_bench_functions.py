@@ -235,6 +235,12 @@ def test_only_some_solvers(tmp_path):
     assert [row.who for row in all_of_them] == list(cases.solvers_of("zdt")) and indicators(all_of_them[:1]) == indicators(alone)
 
 
+def test_ours_alone_has_its_medians_and_no_test_of_ranks():
+    rows = [Row("UF1", "MACS", {"igd": [0.1, 0.2, 0.3, 0.4, 0.5], "seconds": [1.0] * 5, "evaluations": [10.0] * 5, "points": [9.0] * 5})]
+    text = Contest("uf").report(rows)
+    assert contest.UNJUDGED in text and "0.300 [0.200, 0.400]" in text and judged.rank(rows, rows[0], "igd") == "" and contest.p_values(rows, "igd") == {}
+
+
 @pytest.mark.slow
 def test_an_interrupt_keeps_the_seeds_that_all_have_finished(tmp_path):
     """As after Ctrl-C: seed 2 of one solver is missing."""

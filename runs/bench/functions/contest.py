@@ -130,7 +130,7 @@ def p_values(rows: Sequence[Row], key: str) -> dict[tuple[str, str], float]:
     found: dict[tuple[str, str], float] = {}
     for case in dict.fromkeys(row.case for row in rows):
         own = {row.who: row for row in rows if row.case == case}
-        if len(own[OURS].values[key]) < ENOUGH:
+        if len(own) < 2 or len(own[OURS].values[key]) < ENOUGH:
             continue
         pairs = pairwise({who: row.values[key] for who, row in own.items()}, larger=key in LARGER)
         mine = [pair for pair in pairs if OURS in (pair.first, pair.second)]

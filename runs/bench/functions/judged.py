@@ -132,8 +132,10 @@ def spread(row: Row, key: str) -> str:
 
 
 def rank(rows: Sequence[Row], row: Row, key: str) -> str:
-    """The place of the median among all solvers, 1 for the best; none where half the runs found nothing."""
+    """The place of the median among all solvers, 1 for the best; none where half the runs found nothing, or without another solver."""
     found = medians(rows, row.case, key)
+    if len(found) < 2:
+        return ""
     if row.who not in found or found[row.who] == (0.0 if key in LARGER else np.inf):
         return "-"
     values, own = np.array(list(found.values())), found[row.who]
