@@ -105,16 +105,19 @@ TARGETS: dict[str, Callable[[Sequence[Row]], list[Target]]] = {
 
 
 def columns_of(rows: Sequence[Row], p: Mapping[tuple[str, str], float]) -> tuple[Column, ...]:
-    """The columns of a table: those indicators that there are."""
+    """The columns of a table: those indicators that there are, and comparisons where there are several solvers."""
     columns: list[Column] = []
+    several = len({row.who for row in rows}) > 1
     for key, title in (("igd", "IGD"), ("volume", "hypervolume"), ("distance", "distance")):
         if any(row.values.get(key) for row in rows):
-            columns += [(title, "", lambda row, key=key: spread(row, key)), ("", "rank", lambda row, key=key: rank(rows, row, key))]  # type: ignore[misc]
-            if key != "distance":
+            columns.append((title, "", lambda row, key=key: spread(row, key)))  # type: ignore[misc]
+            if several:
+                columns.append(("", "rank", lambda row, key=key: rank(rows, row, key)))  # type: ignore[misc]
+            if several and key != "distance":
                 columns.append(("to best", "rival", lambda row, key=key: ratio(rows, row, key)))  # type: ignore[misc]
     return (
         *columns,
-        ("p", "Holm", lambda row: f"{p[row.case, row.who]:.2g}" if (row.case, row.who) in p else ""),
+        *([("p", "Holm", lambda row: f"{p[row.case, row.who]:.2g}" if (row.case, row.who) in p else "")] if several else []),
         ("evalua-", "tions", lambda row: f"{row.of('evaluations'):.0f}"),
         ("", "points", lambda row: f"{row.of('points'):.0f}"),
         ("s", "", lambda row: short(row.of("seconds"))),
@@ -132,10 +135,8 @@ def spread(row: Row, key: str) -> str:
 
 
 def rank(rows: Sequence[Row], row: Row, key: str) -> str:
-    """The place of the median among all solvers, 1 for the best; none where half the runs found nothing, or without another solver."""
+    """The place of the median among all solvers, 1 for the best; none where half the runs found nothing."""
     found = medians(rows, row.case, key)
-    if len(found) < 2:
-        return ""
     if row.who not in found or found[row.who] == (0.0 if key in LARGER else np.inf):
         return "-"
     values, own = np.array(list(found.values())), found[row.who]
