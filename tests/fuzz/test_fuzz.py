@@ -27,6 +27,7 @@ def test_terms_mean_the_same_to_both():
         assert found == pytest.approx(ours, rel=1e-12, abs=1e-300) or np.isnan(ours), "what is taken from itself may be 0 to CasADi"
 
 
+@pytest.mark.slow
 def test_other_code_sees_what_a_point_misses():
     problem = Problem("cart")
     drive = problem.phase("drive", t0=0.0, tf=(1.0, 5.0))

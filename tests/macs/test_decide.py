@@ -94,6 +94,7 @@ def test_every_method_finds_its_optimum(preference: Preference, T: float, values
     assert choice.point.optimality < 1e-6 and choice.point.verified and choice.point.status == "converged"
 
 
+@pytest.mark.slow
 def test_values_that_are_enough_are_reached_and_no_more() -> None:
     enough = Nimbus(NOW, to={"effort": 8.0}, free=["time"], enough=True)
     choice = decide(cart(), MESH, enough, ranges=RANGES, start=ends())
@@ -297,6 +298,7 @@ def _unit() -> Ranges:
     return Ranges({f"from {i}": 0.0 for i in range(3)}, {f"from {i}": 2.0 for i in range(3)})
 
 
+@pytest.mark.slow
 def test_where_a_state_is_limited() -> None:
     choice = decide(bryson_denham(), DFET(8, 3), ReferencePoint({"highest": 0.1}), starts=1)
     assert choice.point.optimality < 1e-6 and choice.point.verified

@@ -134,6 +134,7 @@ def test_without_mending_it_would_miss_by_far(monkeypatch, no_work) -> None:
     assert abs(choice.objectives["time"] - BALANCED) > 0.1 and not again(choice)
 
 
+@pytest.mark.slow
 def test_what_it_costs_is_counted(monkeypatch, no_work) -> None:
     mended = asked(WISHES[0][0])
     monkeypatch.setattr(Desk, "_to_mend", lambda self, point: False)

@@ -303,6 +303,7 @@ def test_classes_on_two_sides_are_drawn_together() -> None:
     assert three == Nimbus(point, improve=["time"], free=["effort"])
 
 
+@pytest.mark.slow
 def test_the_history_is_drawn() -> None:
     dialogue = Dialogue(front())
     dialogue.choose()
@@ -321,6 +322,7 @@ def test_the_history_is_drawn() -> None:
     assert len(dialogue.plot(PhysicalProgramming(CLASSES), Figure(layout="constrained"))) == 3
 
 
+@pytest.mark.slow
 def test_a_front_that_was_not_simulated_is_saved_with_points_that_were(tmp_path: Path) -> None:
     bare = sweep(cart(), MESH, points=5, verify=None, starts=1)
     dialogue, path = Dialogue(bare, cart(), MESH), tmp_path / "choice.json"

@@ -85,6 +85,7 @@ def test_a_time_limit_ends_a_solve_between_its_iterations():
     assert stats["return_status"] == "User_Requested_Stop" and stats["iter_count"] > 10
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_solve_between_its_iterations():
     solver = endless()
     with Interrupts() as interrupts, ctrl_c(LIMIT), within(BOUND):
@@ -219,6 +220,7 @@ def test_points_whose_simulation_is_cut_short_are_not_verified_and_not_lost(endl
     assert len(found) == 2 and not found.was_simulated.any() and not found.verified.any()
 
 
+@pytest.mark.slow
 def test_what_was_found_is_still_simulated_if_that_is_quick():
     with Interrupts() as interrupts:
         found = MACS().solve(load("goddard"), DFET(4, 3), evaluations=60, seed=1, callback=lambda _: signal.raise_signal(signal.SIGINT))
@@ -258,6 +260,7 @@ def test_tools_without_time_for_their_first_solve_say_so():
     assert ends.status.tolist() == ["timeout", "timeout"] and not ends.stats["reproducible"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "tool",
     [

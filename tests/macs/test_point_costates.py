@@ -277,6 +277,7 @@ def test_a_picture_shows_them_below(ascents):
     assert len(ascents.replace(costates=[None] * len(ascents))[3].plot(costates=True)) == 5
 
 
+@pytest.mark.slow
 def test_the_objective_that_was_asked_for_is_certified_by_itself_if_it_can_be(monkeypatch):
     """Others are then not looked at, which would take as long; where that is no optimum of it alone, all are."""
     method, asked = parse("dfet:4x6"), np.array([False, True])

@@ -45,6 +45,7 @@ def places(fuzzy: FuzzyFunction) -> list[float]:
     return [*np.random.default_rng(3).uniform(marks[0] - 2, marks[-1] + 1, 12), *marks]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
 @pytest.mark.parametrize("one", CLASSES, ids=repr)
 @pytest.mark.parametrize("spread", [1e-3, 0.1, 0.5, 3.0])

@@ -109,6 +109,7 @@ def test_what_was_simulated_beyond_a_hard_limit_is_beyond_it():
     assert ranking.order[0] == 1 and ranking.message == ""
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(st.lists(st.tuples(st.integers(4, 16), st.booleans(), st.booleans()), min_size=1, max_size=7, unique_by=lambda one: one[0]))
 def test_hard_limits_come_before_simulations_and_these_before_values(points):
@@ -175,6 +176,7 @@ def test_given_ranges_normalise():
     assert GoalProgramming({"time": 1.0}).rank(front, wide).values == pytest.approx((front.F[:, 0] - 1.0) / 10)
 
 
+@pytest.mark.slow
 def test_black_boxes_are_ranked():
     def function(X):
         return np.column_stack([X[:, 0] ** 2 + X[:, 1], (X[:, 0] - 2) ** 2 + X[:, 1]])

@@ -79,6 +79,7 @@ def test_a_ranking_is_shown_in_one_line() -> None:
 # Figures
 
 
+@pytest.mark.slow
 def test_the_figure_sets_apart_what_is_beyond_limits_and_what_is_doubtful() -> None:
     points = front(status=["converged", "converged", "converged", "failed"])
     own = Figure().add_subplot()

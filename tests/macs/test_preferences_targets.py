@@ -64,6 +64,7 @@ def test_where_all_goals_are_met_the_point_is_not_dominated():
     assert GoalProgramming({"time": 3.5, "effort": 3.0}).rank(dominated).best.index == 1
 
 
+@pytest.mark.slow
 def test_priorities_come_one_after_the_other():
     first_time = GoalProgramming({"time": 2.0, "effort": 0.3}, priorities=["time", "effort"])
     assert chosen(first_time) == pytest.approx(2.0, abs=STEP)

@@ -118,6 +118,7 @@ def test_the_points_are_those_of_macs_to_the_last_bit(name, settings):
     assert len(front) and np.array_equal(ordered(res.X, res.F), of(front))
 
 
+@pytest.mark.slow
 def test_the_paper_is_the_same_too():
     front = macs.MACS.paper(archive=20).minimize(get_problem("zdt2"), evaluations=500, seed=2)
     res = minimize(get_problem("zdt2"), MACS.paper(archive=20, save_history=True), ("n_eval", 500), seed=2)
@@ -160,6 +161,7 @@ def test_many_objectives():
         minimize(get_problem("dtlz2", n_obj=6), MACS(archive=5), ("n_eval", 100))
 
 
+@pytest.mark.slow
 def test_one_objective_gives_one_point_as_pymoo_does():
     res = minimize(get_problem("sphere"), MACS(), ("n_eval", 3_000), seed=1)
     assert res.X.shape == (10,) and res.F.shape == (1,) and res.F[0] < 1e-4
@@ -246,6 +248,7 @@ def test_after_the_end_nothing_is_evaluated():
     assert algorithm.evaluator.n_eval == 50 and np.array_equal(algorithm.opt.get("F"), F)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_points():
     one, same, other = (minimize(get_problem("zdt1"), MACS(), ("n_eval", 300), seed=seed).X for seed in (1, 1, 2))
     assert np.array_equal(one, same) and not np.array_equal(one, other)
@@ -378,6 +381,7 @@ def test_a_budget_may_come_and_go():
     assert 100 < between < PLANNED and algorithm.evaluator.n_eval == between + 33
 
 
+@pytest.mark.slow
 def test_an_interrupt_loses_no_evaluation():
     class Interrupted(Evaluator):
         def _eval(self, *args: Any, **kwargs: Any) -> None:

@@ -13,6 +13,7 @@ from runs import gd
 from transcription import DFET
 
 
+@pytest.mark.slow
 def test_least_effort_is_that_of_an_optimal_flight():
     point = optimize(landing_site.problem(landers=1), DFET(1, 3), objective="hazard", start=np.full((1, 8), 1e-3), starts=1)
     flight = point.trajectory["divert"].at(landing_site.DURATION)

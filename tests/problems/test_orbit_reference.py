@@ -40,6 +40,7 @@ def test_reference_is_a_front() -> None:
     np.testing.assert_allclose(-reference[[0, -1], 1], [0.28345965587, -0.05344446957], atol=1e-10)
 
 
+@pytest.mark.slow
 def test_the_optimal_flight_is_a_flight_of_its_control_and_ends_where_the_front_says() -> None:
     for tf in (20.0, 33.3, 80.0):
         flight = orbit_rise.optimal_flight(tf, points=4001)

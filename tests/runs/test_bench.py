@@ -318,6 +318,7 @@ def test_the_command_prints_and_saves(small, capsys, tmp_path):
     assert all(np.isfinite(float(row["value"])) for row in table)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [Stopped("interrupted"), KeyboardInterrupt()])
 def test_ctrl_c_prints_what_there_is(small, capsys, monkeypatch, how):
     measure = inner._measure

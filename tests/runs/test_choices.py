@@ -63,6 +63,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_every_choice_has_a_row_those_that_are_alike_too(folder, told):
     rows = rows_of(folder / "report" / "glide-dfet-2x2-choices.csv")
     assert [row["choice"] for row in rows] == ["goals, regulating 0", "goals, regulating 0.1", "goals, regulating 0.2", "even"]

@@ -141,6 +141,7 @@ def test_solve_prints_defects_and_leaves_a_front_and_a_picture(saved):
     assert "60 / 60 evaluations" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys):
     assert main(["solve", "glide.py:build", "--no-refine"]) == 0
     assert main(["solve", "glide.py:build", "--no-refine", "--evaluations", "40"]) == 0
@@ -151,6 +152,7 @@ def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys):
     assert main(["verify", "glide.nc", "--problem", "glide.py:build"]) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "exceeded"),
     [("shooting:6:linear", ""), ("multiple-shooting:4x2:kutta3", ""), ("multiple-shooting:4x2:kutta3:spline:3", "bounds of leg.u")],

@@ -115,6 +115,7 @@ def test_runs_of_old_are_simulated_by_the_report(folder, tmp_path):
     assert len(runs) == 4
 
 
+@pytest.mark.slow
 def test_the_report_says_how_many_were_claimed(folder):
     text = str(study().report(folder, figures=False))
     assert "points claimed, and points verified" in text and "simulated by DOP853" in text

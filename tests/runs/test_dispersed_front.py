@@ -80,6 +80,7 @@ def test_tables_and_figures_of_the_report(folder, found):
     assert dispersed_fronts(comparisons(Store.open(folder), {}), {}) == []
 
 
+@pytest.mark.slow
 def test_every_measure_has_a_panel(found):
     (figure,) = found.figures().values()
     assert [ax.get_title(loc="left").partition(" [")[0] for ax in figure.axes] == [name for name, _ in found.measures["nominal"][0]]

@@ -115,6 +115,7 @@ def test_gradient_solves_are_charged_by_counted_work(place):
     assert CHARGED in AXES and not histories(comparison, comparison.against, "IGD", CHARGED)
 
 
+@pytest.mark.slow
 def test_work_on_transcriptions_of_different_kinds_is_compared_by_instructions(tmp_path):
     study = Study(
         "mixed",

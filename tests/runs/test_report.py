@@ -74,6 +74,7 @@ def test_gradient_tools_alone_need_no_ends_and_no_figures_over_evaluations(solve
     assert any("over-time.png" in name for name in names) and not any("over-evaluations" in name for name in names)
 
 
+@pytest.mark.slow
 def test_everything_is_told_and_written(folder, told):
     assert "gliders: 4 of 9 runs finished" in told
     assert "broken: 3 failed, which count as worse than any" in told
@@ -195,6 +196,7 @@ def test_a_reference_may_be_a_file_or_the_union_or_unknown(folder, tmp_path):
         comparison.reference("nowhere.csv")
 
 
+@pytest.mark.slow
 def test_fronts_of_other_programs_join(folder, tmp_path, capsys):
     file = tmp_path / "theirs.csv"
     file.write_text("time [s],distance [km]\n1,2.5\n5,14\n")

@@ -102,6 +102,7 @@ def test_finished_runs_are_neither_made_again_nor_touched_and_more_may_be_added(
     assert len(study().run(folder).runs) == 3 and len(list(Store.open(folder).runs())) == 4
 
 
+@pytest.mark.slow
 def test_the_runs_of_some_solvers_first(tmp_path):
     batch = study(solvers={"plain": Plain(), "other": Plain()}, runs=1)
     some = batch.run(tmp_path / "out", executor=Inline(), solvers=["other"])
@@ -176,6 +177,7 @@ def troubled(late, tmp_path_factory):
     return trouble, folder / "out", trouble.run(folder / "out")
 
 
+@pytest.mark.slow
 def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(troubled, late):
     _, _, summary = troubled
     status = {cell.solver: [run.status for run in runs] for cell, runs in summary.cells.items()}
@@ -418,6 +420,7 @@ def test_another_study_in_the_same_folder_is_refused(made, changes, words):
     assert words in str(refused.value) and stamps(made[0]) == before
 
 
+@pytest.mark.slow
 def test_runs_begin_as_the_study_says(tmp_path):
     def made(start) -> list[list[float]]:
         given = {"solvers": {"nsga2": {"solver": "nsga2", "population": 6, "degree": "sum"}}, "evaluations": 12, "runs": 1}

@@ -59,6 +59,7 @@ def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
         study(terms={"macs": {**APART["macs"], "evaluations": 30}}).run(tmp_path / "out", executor=Inline())
 
 
+@pytest.mark.slow
 def test_all_may_work_apart(tmp_path):
     terms = {"macs": {"transcription": "dfet:2x2"}, "nsga2": {"transcription": "shooting:5", "inner": "propagate"}}
     each = study(terms=terms, transcriptions=None, inner="auto", runs=1)

@@ -127,6 +127,7 @@ def table_places(table) -> np.ndarray:
     return nodes(table.costate_basis, len(table.costates) - 1)
 
 
+@pytest.mark.slow
 def test_gauss_is_dfet_with_controls_of_the_degree_of_the_states():
     problem = load("goddard")
     ours, dfet = Collocation(3, 4, points="gauss").transcribe(problem), DFET(3, 3).transcribe(problem)
@@ -440,6 +441,7 @@ def test_every_inner_level_makes_candidates_feasible(points, inner):
     assert (found.violation <= 1e-6).all() and (found.status == "converged").all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("points", POINTS)
 def test_one_polynomial_that_newtons_method_cannot_find_is_a_status(points):
     nlp = Collocation(1, 20, points=points).transcribe(load("reentry_case1"))
@@ -463,6 +465,7 @@ def test_searches_are_solved_saved_and_loaded(method, tmp_path):
     assert len(swept) == 3 and (swept.status == "converged").all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("points", POINTS)
 def test_meshes_are_refined_until_a_simulation_agrees(points):
     coarse = optimize(load("standard/van_der_pol"), Collocation(8, 4, points=points), verify=None, starts=1)

@@ -95,6 +95,7 @@ def test_the_ascent_has_the_costates_of_the_linear_tangent_law(word, flight_time
     assert costate.hamiltonian == pytest.approx(np.full(len(flown.time), -weights[0]), rel=tolerance)
 
 
+@pytest.mark.slow
 def test_by_the_adjoint_equation_they_are_the_same():
     for word in ("gauss:8x4", "radau:8x4", "dfet:6x5", "dfet:8x4:bernstein:2"):
         _, own = adjoint(pendulum(0.4), word)
@@ -237,6 +238,7 @@ def along(name: str, word: str):
     return adjoint(STATEMENTS[name](STARTS.get(name, 0.1)), word)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", FINE)
 @pytest.mark.parametrize("name", STATEMENTS)
 def test_the_first_costate_is_the_slope_of_the_optimum(name, method):

@@ -31,6 +31,7 @@ def test_as_many_are_counted_as_there_are():
     assert DFET(50, 2).transcribe(load("goddard")).dense == 0
 
 
+@pytest.mark.slow
 def test_those_of_multiple_shooting_grow_with_its_intervals():
     counts = [MultipleShooting(n).transcribe(load("goddard")).dense for n in (100, 200, 400)]
     assert np.allclose(np.diff(np.log2(counts)), 1.0, atol=0.05)

@@ -30,6 +30,7 @@ def two_phases() -> Problem:
     return problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
 def test_equal_elements_given_by_their_edges_are_equal_elements(basis):
     n = 7
@@ -79,6 +80,7 @@ def test_the_degree_of_the_controls_follows_the_order_unless_it_is_given():
     assert free == [4 * 10 + 1, 4 * 3 + 1]
 
 
+@pytest.mark.slow
 def test_a_mesh_may_have_a_degree_of_controls_of_its_own():
     nlp = DFET(3, 2, control_order=1, mesh={"swing": (UNEVEN, 4, 0)}).transcribe(oscillator())
     assert nlp.unpack(propagated(nlp, k=1)[0])["swing"].control.coefficients.shape == (4, 1, 2)

@@ -37,6 +37,7 @@ def test_moving_edges_are_free_variables_that_cannot_meet():
     assert nlp.guess[names.index("swing.edge[3]")] == 0.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
 @pytest.mark.parametrize("order", [0, 1, 4])
 def test_where_the_edges_are_the_equations_are_those_of_a_mesh_with_these_edges(basis, order):
@@ -165,6 +166,7 @@ def test_a_switch_is_where_it_belongs(basis, control_order):
     assert method.settled(point.trajectory).mesh_of("run").edges[1] == pytest.approx(place, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_constant_control_is_one_variable_on_its_arc():
     mesh = PhaseMesh(EDGES, 3, 2, MOVING, {"u": [1, 0], "v": (2,)})
     assert mesh.constant == (("u", (0, 1)), ("v", (2,))) and mesh.arcs.tolist() == [0, 1, 1, 2]

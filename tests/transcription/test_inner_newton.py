@@ -41,6 +41,7 @@ def two_phases():
     return problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("problem", "mesh"),
     [
@@ -132,6 +133,7 @@ def limited_speed():
     return problem
 
 
+@pytest.mark.slow
 def test_active_path_constraints_are_met_at_the_nearest_point():
     nlp = DFET(6, 3).transcribe(limited_speed())
     C = candidates(nlp, 20)

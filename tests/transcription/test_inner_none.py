@@ -89,6 +89,7 @@ def test_a_population_search_has_the_dynamics_among_its_constraints():
     assert not len(tight) and "violates" in tight.message
 
 
+@pytest.mark.slow
 def test_gradient_solves_make_its_points_feasible():
     front = MACS(mesh="fixed").solve(load("goddard"), Collocation(2, 4), evaluations=300, seed=1, inner="none")
     assert len(front) >= 5 and front.violation.max() < 1e-6

@@ -298,6 +298,7 @@ def test_pieces_are_what_the_error_asks_for():
 # Growth
 
 
+@pytest.mark.slow
 def test_growth_is_that_of_the_closed_form():
     """x' = k x + u: an error at the beginning grows by exp(k t)."""
     for rate, duration in ((1.0, 20.0), (-1.0, 20.0)):

@@ -114,6 +114,7 @@ def test_a_landing_switches_where_it_should(word):
     assert switched(method, problem, found[2][1]) is None
 
 
+@pytest.mark.slow
 def test_the_fastest_ascent_is_the_closed_form():
     found, method = followed(load("goddard"), DFET(8, 3, basis="bernstein"))
     exact = reference(3)[0, 0]

@@ -53,6 +53,7 @@ def bang_bang(draw):
     return edges, rows, places
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(case=bang_bang())
 def test_smeared_switches_are_found_where_they_are(case):

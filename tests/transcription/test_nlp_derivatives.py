@@ -74,6 +74,7 @@ def gap(one: ca.DM, other: ca.DM) -> float:
     return float(np.abs(a - b).max() / np.abs(b).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_from_points_are_those_of_the_whole(case):
     problem, method = CASES[case]

@@ -57,6 +57,7 @@ def test_what_is_in_reach_is_reached(method, end, seed):
     assert solved.status == "converged" and solved.violation <= 1e-6 and solved.message == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "method"), [("goddard", DFET(8, 3)), ("landing_site", Collocation(6, 3)), ("orbit_rise", DFET(20, 3))])
 def test_trajectories_are_found_from_anywhere(name, method):
     nlp = method.nlp(load(name))

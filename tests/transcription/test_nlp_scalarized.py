@@ -101,6 +101,7 @@ def test_three_objectives() -> None:
     assert solved.status == "converged" and close(solved, np.full(3, 2 / 3), 1e-8)
 
 
+@pytest.mark.slow
 def test_goddard_meets_the_linear_tangent_law() -> None:
     truth = reference(401)
     for tf in (115.0, 180.0, 250.0):

@@ -339,6 +339,7 @@ def two_legs() -> Problem:
     return problem
 
 
+@pytest.mark.slow
 def test_linked_phases_a_free_time_between_them_and_a_parameter():
     found = [optimize(two_legs(), method, objective="effort", starts=1) for method in (MultipleShooting(12, control="linear"), DFET(4, 3))]
     assert [point.status for point in found] == ["converged"] * 2
@@ -501,6 +502,7 @@ def lag(rate: float, tf: object = 100.0) -> Problem:
     return problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "limit"), [("euler", 2.0), ("rk4", 2.7853), ("rk8", 4.0)])
 def test_a_lag_that_the_step_cannot_follow_is_refused(scheme, limit):
     SingleShooting(51, scheme=scheme).transcribe(lag(0.9 * limit / 2))

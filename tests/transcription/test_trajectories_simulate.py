@@ -95,6 +95,7 @@ def test_a_tampered_control_is_found(element):
     )
 
 
+@pytest.mark.slow
 def test_objectives_and_violations_are_those_of_the_transcription():
     nlp = DFET(4, 8).transcribe(oscillator())
     C = candidates(nlp, 1)
@@ -228,6 +229,7 @@ def test_stiff_dynamics_have_their_methods():
     assert simulated(nlp, z, rtol=1e-8, method="Radau").objectives["end"] == pytest.approx(np.cos(1), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_what_is_too_stiff_for_an_explicit_method_is_simulated_by_an_implicit_one(monkeypatch):
     """x' = a (u - x), which follows u within 1/a."""
     monkeypatch.setattr(arcs, "MOST_CALLS", 2000)
@@ -257,6 +259,7 @@ def linear(a: float, b: float) -> Problem:
     return problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"])
 def test_dynamics_that_break_down_are_an_infinite_defect(method, capfd):
     """x' = -1/x reaches 0 at t = 1/2, where there is nothing more to integrate; or nothing from the start."""

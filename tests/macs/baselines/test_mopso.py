@@ -130,6 +130,7 @@ def schaffer(X: np.ndarray) -> np.ndarray:
     return np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1)
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(st.integers(1, 12), st.integers(1, 9), st.integers(1, 6), st.integers(0, 10**6))
 def test_what_always_holds_of_its_archive(particles, archive, cells, seed) -> None:

@@ -166,6 +166,7 @@ def test_with_one_constraint_they_are_still_pymoo_s_own_if_interrupted_too(setti
         assert np.array_equal(state.diversity.F, truth.algorithm.da.get("F"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [SMALL[0], *SMALL[6:]], ids=named)
 def test_they_draw_from_no_generator_but_the_run_s(settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     class Forbidden:

@@ -55,6 +55,7 @@ def test_gradient_solves_count_all_their_iterations():
     assert evaluator.counts.work - before == n * (evaluator.counts.inner_iterations - iterations) > 0
 
 
+@pytest.mark.slow
 def test_fronts_say_it_and_add_it_up():
     front = MACS(agents=4, archive=4, mesh="fixed").solve(load("goddard"), METHOD, evaluations=60, seed=1, verify=None)
     work = front.stats["work"]

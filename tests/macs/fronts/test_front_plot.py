@@ -221,6 +221,7 @@ def test_pictures_need_no_display(tmp_path):
     assert (tmp_path / "a.png").stat().st_size > 1000 and (tmp_path / "b.png").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_legends_stand_above_the_axes_and_below_the_title():
     """Also of long names, which are wrapped: no data can be behind them."""
     long = [Objective(f"an objective with a long name, number {k}, as users have them", "kg m2/s2") for k in range(2)]
@@ -280,6 +281,7 @@ def test_trajectories_that_are_not_verified_say_so_and_have_hollow_nodes():
     assert [title.rpartition("; ")[2] for title in titles[1:]] == ["not verified", "not feasible"] and ";" not in titles[0]
 
 
+@pytest.mark.slow
 def test_designs_that_are_not_verified_are_hollow():
     F = np.array([[1.0, 4.0], [2.0, 3.0], [3.0, 2.0], [4.0, 1.0]])
     front = marked(black_box(4, 2, F=F, status=["converged"] * 3 + ["infeasible"]), [True, False, True, False])

@@ -85,6 +85,7 @@ def test_other_points_are_drawn_beside_those_of_two_objectives():
         black_box(6, 3).plot(beside={"known": many})
 
 
+@pytest.mark.slow
 def test_a_shorter_trajectory_is_above_a_longer_one():
     front = flights(5)
     ends = [point.trajectory.phases[-1].tf for point in front]

@@ -24,6 +24,7 @@ def solved(name: str, method=COARSE) -> tuple[Front, float]:
     return point.alone(), abs(known.error(point.objectives[known.objective]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["car", "rocket", "free_flying_robot", "tumour", "two_link_arm", "reorientation"])
 def test_it_is_said_where_the_optimum_is_missed(name):
     front, error = solved(name)
@@ -38,12 +39,14 @@ def test_nothing_is_said_where_a_coarse_mesh_does(name):
     assert front.verified.all() and error < 1e-4 and SAID not in front.table()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["car", "moon_landing", "bryson_denham", "van_der_pol", "tumour", "catalyst_mixing"])
 def test_nothing_is_said_on_the_mesh_that_is_found(name):
     front, error = solved(name, None)
     assert front.verified.all() and error < 5e-4 and SAID not in front.table()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["car", "tumour"])
 def test_what_is_said_to_help_helps(name):
     front, error = solved(name)

@@ -109,6 +109,7 @@ def test_objectives_that_only_the_mesh_believes_are_found():
     assert any(not check.ok and "objectives differ" in " ".join(check.reasons) for check in checks)
 
 
+@pytest.mark.slow
 def test_statuses_and_violations_that_were_touched_up_are_found(front):
     assert all(not check.ok for check in verify(altered(front, violation=np.full(len(front), 123.0)), tolerance=1))
     assert all(not check.ok for check in verify(altered(front, status=np.full(len(front), "failed")), tolerance=1))

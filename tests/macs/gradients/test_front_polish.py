@@ -30,6 +30,7 @@ def smooth(rough) -> Front:
     return rough.polished(FINE, solves=50)
 
 
+@pytest.mark.slow
 def test_the_front_comes_down_to_the_truth(rough, smooth):
     truth = reference(20001)
     assert distance_to_curve(rough.objectives, truth).max() > 1e-2, "there is something to do"
@@ -46,6 +47,7 @@ def test_costs_are_those_of_both(rough, smooth):
     assert smooth.solver == rough.solver and smooth.stats["seed"] == 1
 
 
+@pytest.mark.slow
 def test_what_no_solve_came_to_stays_what_it_is(rough, tmp_path):
     few = rough.polished(FINE, solves=5)
     methods = {point.transcription["method"] for point in few}

@@ -248,6 +248,7 @@ def test_a_polish_that_is_stopped_loses_nothing_and_goes_on(kind, solves) -> Non
     assert state.archive.Z.tobytes() == whole.archive.Z.tobytes() and state.archive.F.tobytes() == whole.archive.F.tobytes()
 
 
+@pytest.mark.slow
 def test_gradient_solves_that_are_stopped_within_a_batch_are_kept() -> None:
     nlp = DFET(3, 2).transcribe(load("goddard"))
 

@@ -56,6 +56,7 @@ def test_nothing_that_converges_is_soon_enough():
     assert (empty.starts, empty.converged, empty.optima(), empty.times()) == (1, 0, 0, 0)
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from([1.0, 2.0, 5.0, None]), min_size=1, max_size=40), st.floats(-8e-6, 8e-6))
 def test_counts_of_a_census(losses, noise):
     census = census_of([None if loss is None else loss * (1.0 + noise * (k % 2)) for k, loss in enumerate(losses)])

@@ -44,6 +44,7 @@ def solved(front: Front, rows: list[int]):
     return solved_on(front, rows, FINE, Programs(front.compiled()))
 
 
+@pytest.mark.slow
 def test_points_are_as_good_as_they_can_be_and_where_they_were(coarse):
     fine = solved(coarse, [0, 1, 2, 3, 4])
     assert (fine.status == CONVERGED).all() and fine.F[:, 1] == pytest.approx(12.0 / fine.F[:, 0] ** 3, rel=1e-7)

@@ -32,6 +32,7 @@ def mended(marked) -> Front:
     return marked.mended()
 
 
+@pytest.mark.slow
 def test_a_mesh_that_is_given_is_kept_and_points_are_only_marked(marked):
     assert marked.verified.tolist() == [False, True, True]
     assert {point.transcription["settings"]["mesh"] for point in marked} == {None}
@@ -137,6 +138,7 @@ def test_points_of_shooting_are_moved_inside_their_limits():
         assert point.transcription["method"] == "SingleShooting"
 
 
+@pytest.mark.slow
 def test_points_that_exceed_a_limit_by_little_keep_their_mesh():
     """The same on elements, whose states are exact: only between nodes is the height too large."""
     rough = sweep(bryson_denham(), DFET(6, 3), points=4, verify=1e-5, starts=1)

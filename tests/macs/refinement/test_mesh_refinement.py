@@ -65,6 +65,7 @@ def test_controls_stay_within_bounds_everywhere(coarse, fine):
     assert all(most(point) <= np.pi / 2 for point in fine)
 
 
+@pytest.mark.slow
 def test_the_note_of_an_unrefined_point_has_the_reason(coarse):
     fine = coarse[[0, 3]].refine_mesh(limit=2)
     assert fine.message == "1 of 2 points meet the mesh tolerance of 1e-07."
@@ -172,6 +173,7 @@ def test_a_time_limit_ends_it_too(coarse):
         coarse.refine_mesh(time_limit=0)
 
 
+@pytest.mark.slow
 def test_points_that_did_not_converge_stay_as_they_are():
     bad = front_with_a_bad_point()
     assert bad.refine_mesh(limit=1)[1].status == "infeasible"

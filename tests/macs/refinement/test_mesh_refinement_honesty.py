@@ -48,7 +48,8 @@ def bounded_layer_cost(x: float, most: float) -> float:
     return layer_costs(turn)[1] + quad(lambda y: 0.5 * (y**2 + most**2) / (most - y**3), turn, x, epsrel=1e-12)[0]
 
 
-@pytest.mark.parametrize("span", [5.0, pytest.param(8.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("span", [5.0, 8.0])
 def test_a_front_keeps_its_ends_however_far_a_finer_mesh_moves_them(span):
     problem = layers(1.0, None, 1000.0, span)
     problem.minimize("miss", (problem.phases["run"].final(problem.phases["run"]["x"]) - 1.5) ** 2)
@@ -222,6 +223,7 @@ def searched(problem: Problem, wanted: Wanted, coarse=COARSE, most_work: float |
 PLAIN = Wanted(1e-3, 1e-3, 1e-3, 1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["breakwell", "bryson_denham", "hypersensitive", "linear_tangent", "moon_landing", "catalyst_mixing"])
 def test_a_mesh_is_found(name):
     value = published(name)[0]
@@ -239,6 +241,7 @@ def test_short_pulses_that_a_coarse_mesh_cannot_show_are_found():
     assert point.verified and point.note == "" and point.simulated["miss"] < 11.4689
 
 
+@pytest.mark.slow
 def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
     hopeless = DFET(1, 1, control_order=0)
     problem = load("standard/bryson_denham")

@@ -149,6 +149,7 @@ def test_three_objectives_of_which_one_is_maximised():
     assert front.F.max() > 0.98, "the ranges are known"
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits():
     first, again, other = (minimize(MIDDLE, 600, seed) for seed in (1, 1, 2))
     assert first.F.tobytes() == again.F.tobytes() and first.decision.tobytes() == again.decision.tobytes()

@@ -78,6 +78,7 @@ def test_what_is_feasible_is_reached_from_infeasible_solves():
     assert solver.reached(poor, *task).status == "converged" and solver.closest is None
 
 
+@pytest.mark.slow
 def test_it_goes_on_where_something_is_feasible():
     front = MACS(agents=5, archive=5, mesh="fixed").solve(ride(0.0), DFET(3, 3), evaluations=300, seed=1, verify=None)
     assert len(front) == 5 and front.stats["stopped"] == "budget" and front.stats["evaluations"] == 300

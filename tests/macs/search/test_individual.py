@@ -157,6 +157,7 @@ def test_the_share_of_lone_agents_is_what_they_gain_of_all():
     assert lone_share(np.array([[1.0, 100.0], [0.0, 0.0]])) == pytest.approx(0.05), "where lone ones have not acted"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lone", [1e-6, 1e-3, 1.0])
 def test_lone_agents_have_their_share_of_the_evaluations(lone):
     """Others gain 1e-3 in each of four evaluations, lone agents this much in each of sixty."""

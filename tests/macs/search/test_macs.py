@@ -224,6 +224,7 @@ def test_settings_of_the_paper():
     assert len(run(MACS.paper(archive=30), boxed(schaffer, [(-2, 2)] * 3), 900).archive) == 30
 
 
+@pytest.mark.slow
 def test_lone_agents_are_as_many_as_the_budget_allows_and_are_never_moved_to_the_archive():
     budgets = (9_999, 35_999, 36_000, 300_000, 1_000_000)
     assert [MACS(archive=100).lone_agents(2, budget) for budget in budgets] == [0, 0, 1, 45, 45]
@@ -332,6 +333,7 @@ def test_the_front_of_the_lunar_ascent():
     assert np.mean(spread) <= 0.044, spread
 
 
+@pytest.mark.slow
 def test_a_short_search_of_the_lunar_ascent():
     state = run(MACS(), Ascent(), 1500)
     assert len(state.archive) == 10

@@ -102,6 +102,7 @@ def test_where_the_way_is_chosen_solves_find_points_along_the_front() -> None:
     assert state.ideal[0] == pytest.approx(2 / np.sqrt(5), rel=1e-2), "full thrust, then none: 2 sqrt(1 / 5)"
 
 
+@pytest.mark.slow
 def test_starts_agree_soon_and_are_never_more_than_the_budget_allows() -> None:
     few, many = (projecting(walk(), METHOD) for _ in range(2))
     for evaluator, budget in ((few, 20), (many, 10_000)):

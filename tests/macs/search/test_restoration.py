@@ -176,6 +176,7 @@ def test_nothing_is_restored_where_constraints_are_not_known_one_by_one():
     assert evaluator.counts.evaluations > before and len(state.samples) > 2
 
 
+@pytest.mark.slow
 def test_the_budget_holds_and_a_resumed_search_continues_to_the_same_bits(tmp_path):
     solver, problem = MACS(archive=10), Sphere(3)
     whole = solver.minimize(problem, evaluations=1503, seed=1, progress=False)

@@ -92,6 +92,7 @@ def file(tmp_path: Path) -> Path:
 # Going on
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("iterations", [0, 1, 5])
 def test_a_black_box_goes_on_to_the_same_bits(file, iterations) -> None:
     part = minimize(checkpoint=file, callback=after(iterations))
@@ -631,6 +632,7 @@ def test_a_folder_without_permission(tmp_path) -> None:
         minimize(checkpoint=tmp_path / "run.ckpt")
 
 
+@pytest.mark.slow
 def test_a_full_disk_loses_neither_the_search_nor_the_last_checkpoint(file, monkeypatch, caplog) -> None:
     monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
     monkeypatch.setattr(checkpoint, "SHARE", 0.0)
@@ -667,6 +669,7 @@ def test_a_disk_that_was_full_for_a_while(file, monkeypatch) -> None:
     assert_same(minimize(checkpoint=file), uninterrupted())
 
 
+@pytest.mark.slow
 def test_writes_are_rare(file, monkeypatch) -> None:
     written = []
     monkeypatch.setattr(checkpoint, "write_whole", lambda path, content: (written.append(len(content)), time.sleep(0.02)))

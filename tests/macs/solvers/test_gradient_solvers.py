@@ -39,6 +39,7 @@ def test_the_best_of_one_objective(goddard):
     )
 
 
+@pytest.mark.slow
 def test_without_an_optimum_the_front_is_empty():
     problem = load("goddard")
     problem.constraint("nowhere", problem.phases["ascent"].final(problem.phases["ascent"]["y"]), lower=11.0, scale=1.0)

@@ -130,6 +130,7 @@ def test_an_interrupt_within_the_first_population_keeps_what_it_had(monkeypatch)
     assert front.stats["stopped"] == "interrupted" and not front.stats["reproducible"]
 
 
+@pytest.mark.slow
 def test_one_evaluation_is_one() -> None:
     front = MACS(mesh="fixed").solve(compiled("goddard"), MESH, evaluations=1, seed=1)
     assert "MACS, 1 evaluation, " in front.table() and "Made feasible" not in front.table()
@@ -164,6 +165,7 @@ def test_a_start_of_another_problem_is_refused() -> None:
         MACS().solve(compiled("orbit_rise"), MESH, evaluations=30, start=[other.closest or other[0]])
 
 
+@pytest.mark.slow
 def test_a_start_of_another_problem_is_refused_before_a_mesh_is_found(monkeypatch) -> None:
     other = MACS().solve(compiled("goddard"), DFET(4, 1), evaluations=30, seed=1)
     monkeypatch.setattr("macs.solvers.solver.search_transcription", lambda *_: pytest.fail("work before the check"))

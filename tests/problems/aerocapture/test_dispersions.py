@@ -200,6 +200,7 @@ def test_roots_of_other_code():
         assert miss(near) == pytest.approx(0.0, abs=5e-3)
 
 
+@pytest.mark.slow
 def test_not_enough_lift_is_flown_with_all_of_it():
     """A steep case needs more lift upward than there is, shallow ones more downward; none is on target, but one is captured."""
     most = abs(capsule(2).lift_to_drag * np.cos(capsule(2).bank)) + 0.01
@@ -229,6 +230,7 @@ def test_small_dispersions_are_linear():
     assert np.abs(expected).max() > 0.02
 
 
+@pytest.mark.slow
 def test_shorter_steps_converge(monkeypatch):
     design, cases = capsule(2), Dispersions(cases=100, seed=1).draw()
     found = []
@@ -241,6 +243,7 @@ def test_shorter_steps_converge(monkeypatch):
     assert errors[0] < 1e-6 and errors[0] < 0.1 * errors[1]
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.7, 1.4), st.floats(-0.2, 0.2), st.sampled_from(sorted(TABLE_2)))
 def test_density_and_ballistic_coefficient_together_change_only_the_heat(factor, angle, number):
