@@ -43,6 +43,11 @@ INDEX_CROSSOVER, INDEX_MUTATION = 15.0, 20.0
 """Distribution indices; a higher index puts offspring nearer to their parents (Deb and Agrawal 1995)."""
 
 
+INDEX_MUTATION_MANY = 10.0
+"""That of mutation with many objectives. Children of a whole archive are near their parents in most coordinates, and the archive keeps
+points of poor local fronts for long: longer steps leave these sooner, and cost little accuracy where there are none."""
+
+
 FROM_MATE = 0.25
 """Part of the crossed coordinates in which a child is near the mate."""
 
@@ -166,10 +171,10 @@ def operator_shares(credit: np.ndarray) -> np.ndarray:
     return LEAST_SHARE + (1.0 - LEAST_SHARE * len(rate)) * rate / rate.sum()
 
 
-def mutate(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def mutate(X: np.ndarray, rng: np.random.Generator, index: float = INDEX_MUTATION) -> np.ndarray:
     """Points (k, d) after polynomial mutation (Deb and Goyal 1996) of one coordinate on average; they may be outside the box."""
     u = rng.random(X.shape)
-    size = 1.0 - (1.0 - np.abs(2.0 * u - 1.0)) ** (1.0 / (INDEX_MUTATION + 1.0))
+    size = 1.0 - (1.0 - np.abs(2.0 * u - 1.0)) ** (1.0 / (index + 1.0))
     return X + np.where(rng.random(X.shape) < 1.0 / X.shape[1], np.copysign(size, u - 0.5), 0.0)
 
 
@@ -181,6 +186,7 @@ def breed(
     rng: np.random.Generator,
     operators: Sequence[tuple[Operator, bool]] = OPERATORS,
     wide: float = WIDE,
+    mutation: float = INDEX_MUTATION,
 ) -> tuple[np.ndarray, np.ndarray]:
     """One offspring of each parent, and the operator that made it.
 
@@ -198,6 +204,8 @@ def breed(
         `OPERATORS` or `OPERATORS_SURFACE`.
     wide : float
         See `mates`.
+    mutation : float
+        Its distribution index.
 
     Returns
     -------
@@ -213,7 +221,7 @@ def breed(
         rows = np.flatnonzero(operator == index)
         if rows.size:
             children = propose(box, X[rows], others[:, rows], rng)
-            trial[rows] = mutate(children, rng) if mutates else children
+            trial[rows] = mutate(children, rng, mutation) if mutates else children
     return box.put_back(trial), operator
 
 
@@ -248,6 +256,7 @@ def breed_archive(trials: Trials) -> None:
         rng,
         OPERATORS_SURFACE if fixed or m > CURVE else OPERATORS,
         1.0 if fixed else WIDE,
+        INDEX_MUTATION_MANY if m > MANY else INDEX_MUTATION,
     )
     bred, result = trials.evaluate(parents.Z[rows], points[rows], trial)
     if result is None:

@@ -98,6 +98,28 @@ def test_mutation_is_small_symmetric_and_of_one_coordinate_on_average():
     assert np.abs(step).max() <= 1.0
 
 
+@pytest.mark.parametrize("index", [0.0, 10.0, 20.0])
+def test_mutation_is_as_long_as_its_index_says(index):
+    """The mean of its polynomial distribution is 1 / (index + 2)."""
+    step = breeding.mutate(np.zeros((20_000, 10)), np.random.default_rng(1), index)
+    assert np.abs(step[step != 0]).mean() == pytest.approx(1.0 / (index + 2.0), rel=0.03)
+
+
+@pytest.mark.parametrize(("m", "index"), [(2, breeding.INDEX_MUTATION), (3, breeding.INDEX_MUTATION), (4, breeding.INDEX_MUTATION_MANY)])
+def test_mutation_takes_longer_steps_with_many_objectives(m, index, monkeypatch):
+    seen = set()
+
+    def noted(X, rng, index):
+        seen.add(index)
+        return X
+
+    monkeypatch.setattr(breeding, "mutate", noted)
+    MACS().minimize(
+        lambda X: np.stack([((X - k / m) ** 2).sum(axis=1) for k in range(m)], axis=1), [(0.0, 1.0)] * 3, evaluations=300, seed=1
+    )
+    assert seen == {index}
+
+
 def test_operators_that_succeed_get_more_and_none_gets_nothing():
     credit, count = breeding.no_credit(len(breeding.OPERATORS)), len(breeding.OPERATORS)
     assert np.allclose(breeding.operator_shares(credit), 1 / count)
