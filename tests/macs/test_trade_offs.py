@@ -376,8 +376,8 @@ def test_rates_of_the_skip_entry_agree_with_differences_of_epsilon_constraint_op
     problem = load("skip")
     method = stated(problem.default_transcription)
     nlp = method.nlp(problem)
-    front = sweep(problem, method, points=4, method="epsilon", starts=1, verify=None)
-    assert len(front) == 4
+    front = sweep(problem, method, points=6, method="epsilon", starts=1, verify=None)
+    assert len(front) == 6
     for point in front[1:-1]:
         shifts = 0.002 * np.ptp(front.F[:, 1]) * np.array([-1.0, 1.0])
         both = [

@@ -110,7 +110,9 @@ def random_problem(seed: int) -> Problem:
     return problem
 
 
-def keeps_what_came_in(seed: int) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(40))
+def test_random_fronts_keep_what_came_in(seed: int) -> None:
     """A refined front has its size, its ends and its spread, and what has no note is right, and no worse than what it was refined from."""
     rng = np.random.default_rng(seed + 1000)
     problem = random_problem(seed)
@@ -133,21 +135,6 @@ def keeps_what_came_in(seed: int) -> None:
     noted = fine.F[[bool(point.note) for point in fine]] - fine.F.min(axis=0)
     # Points that share the best of one objective are one end: the other objective is determined there by the root of the accuracy only.
     assert len(noted) <= 1 or (noted <= 1e-6 * span).all(axis=0).any(), [point.note for point in fine]
-
-
-QUICK = (0, 1, 11, 30, 34)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", QUICK)
-def test_random_fronts_keep_what_came_in(seed):
-    keeps_what_came_in(seed)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [seed for seed in range(40) if seed not in QUICK])
-def test_many_random_fronts_keep_what_came_in(seed):
-    keeps_what_came_in(seed)
 
 
 @pytest.mark.slow
