@@ -68,14 +68,3 @@ def test_with_gradients_the_front_is_as_exact_as_its_mesh(case, mesh, truth, eva
         assert solves <= evaluations // 20
         if case == "goddard":
             assert max(point.simulate(rtol=1e-10).max_defect for point in front if point.objectives["flight time"] > 115) < 1e-5
-
-
-def test_on_adaptive_meshes_the_front_is_true() -> None:
-    front = MACS(mesh="adaptive").solve(load("goddard"), DFET(4, 6), evaluations=10_000, seed=1)
-    distances = distance_to_curve(front.objectives, goddard.reference())
-    defects = np.array([point.simulate(rtol=1e-12, atol=1e-13).max_defect for point in front])
-    told = np.array([bool(point.note) for point in front])
-    print(f"goddard, adaptive: distances {distances}, defects {defects}, notes {told}")
-    assert len(front) == 10 and np.count_nonzero((distances < 1e-6) & (defects < 1e-7)) >= 9
-    assert told[(distances >= 1e-6) | (defects >= 1e-7)].all()
-    assert all(not any((point.excursions or {}).values()) for point in front)

@@ -94,6 +94,7 @@ def commands(block: Block) -> Iterator[list[str]]:
 )
 def test_the_code_of_a_page_runs_and_prints_what_it_says(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)  # where a page imports its own file
     monkeypatch.setenv("MPLBACKEND", "Agg")
     space: dict[str, Any] = {"__name__": "__manual__"}
     printed = io.StringIO()

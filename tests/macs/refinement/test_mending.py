@@ -32,6 +32,12 @@ def mended(marked) -> Front:
     return marked.mended()
 
 
+@pytest.fixture(scope="module")
+def unverified() -> Front:
+    """Of a search that simulates nothing."""
+    return MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
+
+
 @pytest.mark.slow
 def test_a_mesh_that_is_given_is_kept_and_points_are_only_marked(marked):
     assert marked.verified.tolist() == [False, True, True]
@@ -152,17 +158,15 @@ def test_points_that_exceed_a_limit_by_little_keep_their_mesh():
 
 
 @pytest.mark.slow
-def test_points_that_were_not_simulated_are_simulated_first():
-    front = MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
-    assert not front.was_simulated.any() and front.mended().verified.all()
-    assert len(front[[]].mended()) == 0
+def test_points_that_were_not_simulated_are_simulated_first(unverified):
+    assert not unverified.was_simulated.any() and unverified.mended().verified.all()
+    assert len(unverified[[]].mended()) == 0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fine", [None, DFET(4, 7)])
-def test_an_empty_front_stays_empty_and_keeps_its_reason(fine):
-    front = MACS(agents=4, archive=4).solve(load("goddard"), DFET(4, 4), evaluations=80, seed=1, verify=None)
-    nothing = mending.mended(front[[]].replace(message="no feasible point"), 1e-3, fine=fine)
+def test_an_empty_front_stays_empty_and_keeps_its_reason(unverified, fine):
+    nothing = mending.mended(unverified[[]].replace(message="no feasible point"), 1e-3, fine=fine)
     assert len(nothing) == 0 and nothing.message == "no feasible point" and nothing.stats["verify"] == 1e-3
 
 

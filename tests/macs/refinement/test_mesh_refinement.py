@@ -231,6 +231,7 @@ def test_goddard_with_defaults(seed):
     ]
     assert len(front) == 10 and sum(good) >= 9
     assert all(point.note for point, fine in zip(front, good, strict=True) if not fine)
+    assert not any(any((point.excursions or {}).values()) for point in front)
 
 
 def within_bounds(point) -> bool:

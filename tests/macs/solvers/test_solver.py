@@ -157,17 +157,13 @@ def test_a_guess_is_among_the_first() -> None:
 
 
 @pytest.mark.slow
-def test_a_start_of_another_problem_is_refused() -> None:
+def test_a_start_of_another_problem_is_refused(monkeypatch) -> None:
     other = MACS().solve(compiled("goddard"), DFET(4, 1), evaluations=30, seed=1)
     with pytest.raises(ValueError, match="other variables"):
         MACS().solve(compiled("orbit_rise"), MESH, evaluations=30, start=other)
     with pytest.raises(ValueError, match="other variables"):
         MACS().solve(compiled("orbit_rise"), MESH, evaluations=30, start=[other.closest or other[0]])
-
-
-@pytest.mark.slow
-def test_a_start_of_another_problem_is_refused_before_a_mesh_is_found(monkeypatch) -> None:
-    other = MACS().solve(compiled("goddard"), DFET(4, 1), evaluations=30, seed=1)
+    # Before a mesh is found.
     monkeypatch.setattr("macs.solvers.solver.search_transcription", lambda *_: pytest.fail("work before the check"))
     with pytest.raises(ValueError, match="other variables"):
         MACS().solve(load("orbit_rise"), evaluations=30, start=other)
