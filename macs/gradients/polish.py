@@ -6,9 +6,9 @@ import numpy as np
 
 from ..evaluation.evaluator import CONVERGED
 from ..pareto.archive import Archive
-from ..pareto.dominance import extremes
+from ..pareto.dominance import CURVE, among, extremes
 from ..pareto.energy import Guide, reach, spread
-from ..pareto.ranges import BETTER, CURVE, distinct, feasible_and_no_worse, nearest, ranges, slack
+from ..pareto.ranges import BETTER, distinct, feasible_and_no_worse, nearest, ranges, slack
 from .counted import CountedSolves
 from .surface import cover
 
@@ -124,7 +124,7 @@ def _descend(
     and the points that are left out for want of solves."""
     span = ranges(archive.F)
     most = max((solves.left - 2 * archive.F.shape[1]) // 2, 1)
-    fresh = ~_among(archive.F, solved)
+    fresh = ~among(archive.F, solved)
     chosen = fresh.copy()
     if most < np.count_nonzero(fresh):
         chosen[fresh] = spread(archive.F[fresh], most, exponent=exponent, guide=guide)
@@ -147,16 +147,11 @@ def _settled(archive: Archive, optima: Archive) -> Archive:
     return _front(optima.take(np.unique(best[settled])).joined(archive.take(~settled)), span)
 
 
-def _among(F: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Mask (n,) of the rows of F (n, m) that are rows of `known` (k, m)."""
-    return (F[:, None] == known).all(axis=2).any(axis=1)
-
-
 def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves, solved: np.ndarray) -> Archive:
     """One point for each objective: its least value, and for that the least values of the others; as they are where all were `solved`."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
-    if _among(best.F, solved).all():
+    if among(best.F, solved).all():
         return best
     one = np.eye(m, dtype=bool)
     single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, span, 0.0))
@@ -184,7 +179,7 @@ def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.nd
         np.fill_diagonal(worse, np.inf)
         pairs = [(i, int(worse[i].argmin())) for i in sorted(rows, key=lambda i: worse[i].min())[: solves.left // 2]]
     known = solves.in_vain if solves.in_vain is not None else np.empty((0, 2 * m))
-    pairs = [(i, j) for i, j in pairs if not _among(np.hstack([archive.F[[i]], archive.F[[j]]]), known)[0]]
+    pairs = [(i, j) for i, j in pairs if not among(np.hstack([archive.F[[i]], archive.F[[j]]]), known)[0]]
     if not 0 < len(pairs) <= solves.left:
         return archive
     own, other = (np.array(index) for index in zip(*pairs, strict=True))

@@ -8,13 +8,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..io.text import counted
-from .dominance import dominates, nondominated, worthwhile
+from .dominance import CURVE, among, dominates, nondominated, worthwhile
 from .energy import Guide, best_of_each, of_low_energy, pair_energies, reach, spread
 from .niches import MANY, best_of_niches
 from .volume import duels
-
-CURVE = 2
-"""Number of objectives up to which a front is a curve. With more, points far from it can be non-dominated for ever, see `worthwhile`."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,7 +59,7 @@ class Archive:
 
     def has(self, F: np.ndarray) -> np.ndarray:
         """Mask (k,) of the objectives F (k, m) that are those of a point."""
-        return (F[:, None] == self.F).all(axis=2).any(axis=1)
+        return among(F, self.F)
 
     def replaced(self, rows: np.ndarray, others: Any) -> Archive:
         """The points, with those of the mask `rows` (n,) replaced by those in the same rows of `others`, such as an `Evaluation`."""

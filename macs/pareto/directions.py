@@ -132,7 +132,9 @@ def _lattice(m: int, population: int | None, divisions: int | None) -> np.ndarra
     divisions = divisions_below(m, population)
     if lattice_size(m, divisions) == population:
         return simplex_lattice(m, divisions)
-    fine = simplex_lattice(m, divisions_below(m, FINER * population))
+    finer = divisions_below(m, FINER * population)
+    # With many objectives, lattices grow by more than that factor from one to the next.
+    fine = simplex_lattice(m, finer if lattice_size(m, finer) > population else finer + 1)
     return fine[spread(fine, population, fine.max(axis=1) == 1.0)]
 
 

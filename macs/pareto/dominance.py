@@ -5,6 +5,11 @@ from __future__ import annotations
 import moocore
 import numpy as np
 
+CURVE = 2
+"""Number of objectives up to which a front is a curve; with more it is a surface, and points far from it can be non-dominated for ever, see
+`worthwhile`."""
+
+
 CHARGE = 0.01
 """Part of the other objectives, in ranges, that is added to each by `worthwhile`."""
 
@@ -15,6 +20,11 @@ def nondominated(F: np.ndarray) -> np.ndarray:
     if keep.any():
         keep[keep] = moocore.is_nondominated(np.ascontiguousarray(F[keep]))
     return keep
+
+
+def among(F: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the rows of F (n, m) that are rows of `known` (k, m)."""
+    return (F[:, None] == known).all(axis=2).any(axis=1)
 
 
 def dominates(A: np.ndarray, B: np.ndarray) -> np.ndarray:
@@ -30,7 +40,7 @@ def worthwhile(F: np.ndarray) -> np.ndarray:
     Kobayashi 2001). With more than two objectives such points are often far from the front, and others rarely dominate them.
     """
     span = np.ptp(F, axis=0)
-    N = F / np.where(span > 0.0, span, 1.0)
+    N = np.where(span > 0.0, F / np.where(span > 0.0, span, 1.0), 0.0)
     keep = nondominated((1.0 - CHARGE) * N + CHARGE * N.sum(axis=1, keepdims=True))
     keep[extremes(F)] = True
     return keep

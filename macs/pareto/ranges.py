@@ -7,10 +7,6 @@ import numpy as np
 from ..evaluation.evaluator import CONVERGED, Evaluation
 from .dominance import nondominated
 
-CURVE = 2
-"""With at most so many objectives the front is a curve, with more it is a surface."""
-
-
 SAME = 1e-7
 """Objectives that differ by less than this part of their ranges are equal."""
 BETTER = 1e-6

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..evaluation.box import Box
-from ..pareto.archive import CURVE
+from ..pareto.dominance import CURVE
 from ..pareto.niches import MANY
 from .state import remember
 from .trials import Trials
@@ -263,4 +263,6 @@ def breed_archive(trials: Trials) -> None:
         return
     remember(state, trials.seen, settings, evaluator)
     if not fixed:
-        state.credit = updated_credit(state.credit, operator[bred], state.archive.joined(state.outside).has(result.F))
+        # A copy of a known point, as where only coordinates changed that no objective depends on, is no success.
+        kept = state.archive.joined(state.outside).has(result.F) & ~parents.has(result.F)
+        state.credit = updated_credit(state.credit, operator[bred], kept)

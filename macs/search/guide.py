@@ -11,9 +11,9 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..evaluation.evaluator import Evaluator
-from ..pareto.dominance import extremes
+from ..pareto.dominance import CURVE, extremes
 from ..pareto.energy import Guide
-from ..pareto.ranges import CURVE, ranges
+from ..pareto.ranges import ranges
 from ..preferences.catalogue import METHODS, to_dict
 from ..preferences.preference import Preference
 from .region import PART, Region

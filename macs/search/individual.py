@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..evaluation.box import Box
-from ..pareto.archive import CURVE
+from ..pareto.dominance import CURVE
 from .breeding import FEW, mates
 from .state import SearchState
 from .trials import Trials

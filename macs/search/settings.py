@@ -12,7 +12,7 @@ import numpy as np
 from problems.checks import check_choice, check_count, check_interval
 from transcription.catalogue import parse
 
-from ..pareto.archive import CURVE
+from ..pareto.dominance import CURVE
 from ..pareto.niches import MANY
 from ..preferences.catalogue import from_dict
 from ..preferences.preference import Preference

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 import moocore
 import numpy as np
 
-from macs.front import Front
-
 from .indicators import Points, goals_of, minimised
 
 
@@ -78,10 +76,6 @@ def attainment(fronts: Sequence[Points]) -> Attainment:
     filled = [part for part in rows if part.size]
     if not rows:
         raise ValueError("there is no run to take attainment surfaces of")
-    for i, front in enumerate(fronts):
-        if isinstance(front, Front) and goals and front.goals != goals:
-            names = ", ".join(goal.name for goal in goals)
-            raise ValueError(f"front {i} has other objectives ({', '.join(front.names)}) than the first ({names})")
     widths = {part.shape[1] for part in filled} | ({len(goals)} if goals else set())
     if not widths:
         raise ValueError("no run has a point: without one, the number of objectives is not known")

@@ -18,6 +18,7 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
+from macs.fronts.pictures.style import label
 from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
 
@@ -188,9 +189,12 @@ def minimised(points: Points, goals: Sequence[Objective] | None, name: str = "th
     Raises
     ------
     ValueError
-        For an array that is not (n, m), has another number of objectives than `goals`, or has NaN or infinite values.
+        For an array that is not (n, m), has another number of objectives than `goals`, or has NaN or infinite values; for a front whose
+        objectives have other names, units or senses, or another order.
     """
     if isinstance(points, Front):
+        if goals is not None and described(points.goals) != described(goals):
+            raise ValueError(f"{name} has other objectives: {described(points.goals)}, not {described(goals)}")
         return points.F[points.status == CONVERGED]
     rows = np.asarray(points, dtype=float)
     if rows.ndim != 2:
@@ -205,6 +209,11 @@ def minimised(points: Points, goals: Sequence[Objective] | None, name: str = "th
     if rows.shape[1] != len(goals):
         raise ValueError(f"{name} has {rows.shape[1]} objectives, the other {len(goals)}: {', '.join(goal.name for goal in goals)}")
     return rows * [goal.sign for goal in goals]
+
+
+def described(goals: Sequence[Objective]) -> str:
+    """Objectives by what has to agree for their values to be compared: sense, name and unit of each."""
+    return ", ".join(f"{goal.sense} {label(goal.name, goal.unit)}" for goal in goals)
 
 
 def goals_of(points: Iterable[Points]) -> tuple[Objective, ...] | None:

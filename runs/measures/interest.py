@@ -38,11 +38,20 @@ class Interest:
 
     @classmethod
     def of(cls, preference: Preference, goals: Sequence[Objective], dense: Points) -> Self:
-        """The region on a dense front: a Front, or an array (n, m) in the user's units and senses."""
+        """The region on a dense front: a Front, or an array (n, m) in the user's units and senses.
+
+        Raises
+        ------
+        ValueError
+            If the points in the region dominate no volume up to their nadir: too few of them are there to measure by.
+        """
         R = truth(dense, goals)
         signs = np.array([goal.sign for goal in goals])
         region = Region.of(preference, goals, R * signs)
         inside = region.contains(R * signs)
+        ideal, unit = extent(R[inside])
+        if not _volume((R[inside] - ideal) / unit) > 0.0:
+            raise ValueError(f"the region of interest has only {inside.sum()} points of the dense front: it has to be denser there")
         return cls(region, tuple(goals), R[inside], float(inside.mean()))
 
     def missing(self, front: Points) -> float:

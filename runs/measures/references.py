@@ -24,7 +24,7 @@ from problems.catalogue import CASES
 from problems.compiled import Objective
 
 from ..data.schema import check_known, errors_begin_with
-from .indicators import Points, goals_of, minimised
+from .indicators import Points, described, goals_of, minimised
 
 if TYPE_CHECKING:
     from problems.compiled import CompiledProblem
@@ -159,7 +159,7 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
     if Path(path).suffix.lower() == ".nc":
         front = Front.load(path)
         if goals and front.goals != tuple(goals):
-            raise ValueError(f"'{path}' has the objectives {_words(front.goals)}, not {_words(goals)}")
+            raise ValueError(f"'{path}' has the objectives {described(front.goals)}, not {described(goals)}")
         return front
     if not goals:
         raise ValueError(f"'{path}' is a table: to read it, state the objectives that it is of")
@@ -170,8 +170,9 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
     columns, status = _columns(lines[0][1], goals, path) if headed else (list(range(len(goals))), None)
     rows = []
     for number, row in lines[headed:]:
-        if len(row) <= max(columns):
-            raise ValueError(f"'{path}', line {number}: {len(row)} columns, at least {max(columns) + 1} are needed")
+        needed = max(*columns, -1 if status is None else status) + 1
+        if len(row) < needed:
+            raise ValueError(f"'{path}', line {number}: {len(row)} columns, at least {needed} are needed")
         if status is not None and row[status] != CONVERGED:
             continue
         cells = [row[i] for i in columns]
@@ -209,10 +210,6 @@ def _is_number(cell: str) -> bool:
         return bool(np.isfinite(float(cell)))
     except ValueError:
         return False
-
-
-def _words(goals: Sequence[Objective]) -> str:
-    return ", ".join(f"{goal.sense} {label(goal.name, goal.unit)}" for goal in goals)
 
 
 @dataclass(frozen=True)

@@ -156,6 +156,15 @@ def test_volumes_and_distances_in_closed_form():
         assert indicator(scaled + np.array([1e-4, 2e4]), scaled) == pytest.approx(indicator(LINE + np.array([0.1, 0.2]), LINE), rel=1e-6)
 
 
+@pytest.mark.parametrize("measure", [gd, igd, igd_plus, additive_epsilon, hypervolume])
+def test_fronts_of_other_objectives_are_not_compared(measure):
+    goals = [Objective("time", "s"), Objective("fuel", "kg")]
+    for others in (goals[::-1], [goals[0], Objective("fuel", "t")], [goals[0], Objective("fuel", "kg", "maximize")]):
+        with pytest.raises(ValueError, match="the reference has other objectives: minimize"):
+            measure(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), others))
+    assert measure(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), [goals[0], Objective("fuel", "kg", scale=2.0)])) >= 0.0
+
+
 def test_empty_fronts_and_nonsense():
     empty = np.empty((0, 2))
     assert np.isnan(gd(empty, LINE)) and hypervolume(empty, LINE) == 0.0

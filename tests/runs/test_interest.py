@@ -58,3 +58,9 @@ def test_beyond_hard_limits_nothing_is_of_interest():
     never = PhysicalProgramming({"a": Smaller(0.1, 0.15, 0.2, 0.25, 0.3), "b": Smaller(0.1, 0.15, 0.2, 0.25, 0.3)})
     middle = Interest.of(never, GOALS, line())
     assert np.abs(middle.points - 0.5).max() < 0.05, "where no limits are met, what exceeds them least"
+
+
+def test_a_region_with_two_points_of_the_dense_front_is_refused():
+    few = line(4)
+    with pytest.raises(ValueError, match="only 2 points of the dense front"):
+        Interest.of(EVENLY, GOALS, few)

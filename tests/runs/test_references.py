@@ -33,6 +33,9 @@ def test_the_union_is_of_fronts_and_arrays():
 
 
 def test_unions_that_make_no_sense():
+    one, other = foreign(np.ones((1, 2)), GOALS), foreign(np.ones((1, 2)), GOALS[::-1])
+    with pytest.raises(ValueError, match="front 1 has other objectives"):
+        union([one, other, np.ones((1, 2))])
     with pytest.raises(ValueError, match="no front"):
         union([])
     with pytest.raises(ValueError, match="row 0 of front 1 is not finite"):
@@ -78,6 +81,7 @@ def test_tables_of_other_programs(tmp_path, text):
         ("1,2\n1\n", "line 2: 1 columns, at least 2"),
         ("1,2\n1,nan\n", "line 2: '1', 'nan' should be 2 finite numbers"),
         ("1,2\n\n1,two\n", "line 3"),
+        ("flight time,speed,status\n1,2\n", "line 2: 2 columns, at least 3"),
     ],
 )
 def test_tables_that_are_none(tmp_path, text, words):

@@ -70,18 +70,21 @@ def solvers_of(name: str) -> tuple[str, ...]:
 
 
 def solvers(names: Sequence[str], points: int) -> dict[str, Solver]:
-    """Ours and these rivals with so many points: each its defaults otherwise, but that NSGA-III gives all its points, and not only the
-    nearest to its directions: covered volumes are the larger, and distances from the true front to the points the smaller."""
-    known: dict[str, Callable[[], Solver]] = {
-        "NSGA-II": lambda: NSGA2(population=points),
-        "NSGA-III": lambda: NSGA3(population=points, whole=True),
-        "MOEA/D": lambda: MOEAD(population=points),
-        "SMS-EMOA": lambda: SMSEMOA(population=points),
-        "AGE-MOEA-II": lambda: AGEMOEA2(population=points),
-        "RVEA": lambda: RVEA(population=points),
-        "C-TAEA": lambda: CTAEA(population=points),
+    """Ours and these rivals with so many points, and with its defaults otherwise.
+
+    As in pymoo, rivals rank infeasible points by the sum of violations. NSGA-III gives all its points, and not only those nearest to its
+    directions: covered volumes are the larger, and distances from the true front to the points the smaller.
+    """
+    known: dict[str, Callable[..., Solver]] = {
+        "NSGA-II": NSGA2,
+        "NSGA-III": partial(NSGA3, whole=True),
+        "MOEA/D": MOEAD,
+        "SMS-EMOA": SMSEMOA,
+        "AGE-MOEA-II": AGEMOEA2,
+        "RVEA": RVEA,
+        "C-TAEA": CTAEA,
     }
-    return {OURS: MACS(archive=points), **{name: known[name]() for name in names}}
+    return {OURS: MACS(archive=points), **{name: known[name](population=points, degree="sum") for name in names}}
 
 
 def from_pymoo(name: str, **sizes: int) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""MACS against other algorithms on a set of plain functions, at equal evaluations, with populations as large as its archive, seed by seed."""
+"""MACS against other algorithms on a set of plain functions, at equal evaluations, seed by seed."""
 
 from __future__ import annotations
 
@@ -72,14 +72,14 @@ class Contest:
         key = JUDGED_BY[self.name]
         p = p_values(rows, key)
         lines = [
-            f"{chosen.title}: MACS with its defaults against algorithms of pymoo with theirs, at equal evaluations, with populations as large",
-            "as its archive; NSGA-III gives all its non-dominated points. Points: the median of how many there are.",
+            f"{chosen.title}: MACS with its defaults against algorithms of pymoo with theirs, at equal evaluations.",
+            "Populations are as large as the archive of MACS; NSGA-III gives all its non-dominated points. Points: how many there are.",
             "IGD: mean distance of the true front from the points, in the objectives' units for UF (as in the competition), else in ranges",
             "of the front. Hypervolume: in these ranges, up to 1.1. Distance: of the points from the front, in closed form. Medians and",
             "quartiles over seeds; rank: of the median among all; to best rival: the median of MACS divided by the best rival's (IGD:",
             "below 1 is better, hypervolume: above 1); p: two-sided Mann-Whitney test against MACS, from five seeds on,",
-            f"by {WORDS[key]}, corrected by Holm over the rivals of each function. NSGA-III, MOEA/D and RVEA have as many directions as points:",
-            f"a simplex lattice where one has so many, else evenly spread ones. All seeds are spawned from {SEED}.",
+            f"by {WORDS[key]}, corrected by Holm over the rivals of each function. NSGA-III, MOEA/D and RVEA have as many directions as",
+            f"points: a simplex lattice where one has so many, else evenly spread ones. All seeds are spawned from {SEED}.",
             *([] if chosen.functions[0].front else ["Ranges are those of what is non-dominated among all that all found."]),
             "",
             table(rows, columns_of(rows, p)),

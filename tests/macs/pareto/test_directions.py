@@ -193,3 +193,11 @@ def test_the_cheapest_pairs_come_first():
     assert rows.tolist() == [1, 0] and columns.tolist() == [0, 1]
     assert costs.tolist() == [[3.0, 2.0, 9.0], [1.0, 4.0, 9.0]]
     assert [len(side) for side in pair_up(np.empty((0, 3)))] == [0, 0]
+
+
+@pytest.mark.parametrize(("m", "population"), [(9, 10), (10, 13), (11, 70), (13, 100), (15, 150), (40, 41)])
+def test_with_many_objectives_the_finer_lattice_has_enough_directions(m, population):
+    """At least one of its next sizes is more than four times the one before."""
+    directions = reference_directions(m, population, None)
+    assert directions.shape == (population, m) and np.allclose(directions.sum(axis=1), 1.0)
+    assert len(np.unique(directions, axis=0)) == population and (directions.max(axis=1) == 1.0).sum() == m

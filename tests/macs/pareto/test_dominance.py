@@ -73,3 +73,8 @@ def test_points_far_worse_for_a_little_of_one_objective_are_left_out_but_not_the
     assert nondominated(far).all()
     assert worthwhile(F).all()
     assert worthwhile(far).tolist() == [True] * 6 + [False, True]
+
+
+def test_an_objective_that_is_the_same_at_all_points_charges_nothing():
+    F = np.array([[0.0, 1.0], [0.5, 0.4], [1.0, 0.0], [0.9, 0.39]])
+    assert worthwhile(np.column_stack([F, np.full(4, 1e20)])).tolist() == worthwhile(F).tolist()

@@ -182,6 +182,24 @@ def test_the_search_credits_what_the_archive_keeps():
     assert not np.array_equal(state.credit, breeding.no_credit(len(breeding.OPERATORS)))
 
 
+def test_copies_of_known_points_are_no_success(monkeypatch):
+    """There are 101 different points, and the front is all of them: once they are known, nothing can be a success."""
+
+    def stairs(X):
+        f = np.round(X[:, :1], 1)
+        return np.hstack([f, -f])
+
+    kept, update = [], breeding.updated_credit
+    monkeypatch.setattr(breeding, "updated_credit", lambda credit, operator, won: kept.append(won.sum()) or update(credit, operator, won))
+    settings, box = MACS(archive=120), boxed(stairs, [(-5, 5)] * 4)
+    state = settings.begin(box, 4000, np.random.default_rng(0))
+    complete = 0
+    while state.evaluations < 4000:
+        complete += len(state.archive) == 101
+        settings.advance(state, box, 4000)
+    assert complete > 5 and sum(kept) > 0 and not any(kept[-complete:])
+
+
 def test_how_many_are_sampled_and_bred():
     assert MACS().points_to_sample(10_000) == MACS().offspring(10, 2) == 10
     assert MACS(archive=100).points_to_sample(30_000) == MACS(archive=100, breeding=1).offspring(100, 3) == 100
