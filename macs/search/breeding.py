@@ -10,8 +10,8 @@ front: what stays says little of progress. The shares are then fixed, most of th
 
 As long as nothing is feasible the archive is empty, and the least violated points are bred likewise: they are ordered by one number, and a
 generation of children with coordinates of both parents lowers it sooner than steps of single agents. Parents are then the better of two
-(Goldberg and Deb 1991). Later, infeasible points with better
-objectives than the archive's are bred with it: feasible parts may be apart from each other.
+(Goldberg and Deb 1991), and steps of mutation longer. Later, infeasible points with better objectives than the archive's are bred with it:
+feasible parts may be apart from each other.
 """
 
 from __future__ import annotations
@@ -41,6 +41,11 @@ DIFFERENCE = 0.5
 
 INDEX_CROSSOVER, INDEX_MUTATION = 15.0, 20.0
 """Distribution indices; a higher index puts offspring nearer to their parents (Deb and Agrawal 1995)."""
+
+
+INDEX_MUTATION_INFEASIBLE = 5.0
+"""That of mutation as long as nothing is feasible. The least violated points are soon nearly alike, so that crossover leads nowhere new, and
+a constraint may have local optima."""
 
 
 INDEX_MUTATION_MANY = 10.0
@@ -247,7 +252,8 @@ def breed_archive(trials: Trials) -> None:
     parents = parents.joined(state.outside)
     points = box.to_unit(parents.Z[:, evaluator.free])
     pool = points if len(points) > FEW else np.vstack([points, trials.positions()])
-    fixed = m > MANY or not len(state.archive)
+    infeasible = not len(state.archive)
+    fixed = m > MANY or infeasible
     trial, operator = breed(
         box,
         points[rows],
@@ -256,7 +262,7 @@ def breed_archive(trials: Trials) -> None:
         rng,
         OPERATORS_SURFACE if fixed or m > CURVE else OPERATORS,
         1.0 if fixed else WIDE,
-        INDEX_MUTATION_MANY if m > MANY else INDEX_MUTATION,
+        INDEX_MUTATION_INFEASIBLE if infeasible else INDEX_MUTATION_MANY if m > MANY else INDEX_MUTATION,
     )
     bred, result = trials.evaluate(parents.Z[rows], points[rows], trial)
     if result is None:
