@@ -44,8 +44,8 @@ INDEX_CROSSOVER, INDEX_MUTATION = 15.0, 20.0
 
 
 INDEX_MUTATION_INFEASIBLE = 5.0
-"""That of mutation as long as nothing is feasible. The least violated points are soon nearly alike, so that crossover leads nowhere new, and
-a constraint may have local optima."""
+"""That of mutation as long as nothing is feasible. The least violated points are soon nearly alike, often at a local optimum of the
+violation, and crossover leads nowhere new: longer steps leave it."""
 
 
 INDEX_MUTATION_MANY = 10.0

@@ -5,6 +5,8 @@ import pytest
 from boxes import boxed
 from hypothesis import given
 from hypothesis import strategies as st
+from pymoo.core.problem import Problem
+from pymoo.problems import get_problem
 
 from macs.evaluation.box import Box
 from macs.search import breeding
@@ -105,8 +107,29 @@ def test_mutation_is_as_long_as_its_index_says(index):
     assert np.abs(step[step != 0]).mean() == pytest.approx(1.0 / (index + 2.0), rel=0.03)
 
 
-@pytest.mark.parametrize(("m", "index"), [(2, breeding.INDEX_MUTATION), (3, breeding.INDEX_MUTATION), (4, breeding.INDEX_MUTATION_MANY)])
-def test_mutation_takes_longer_steps_with_many_objectives(m, index, monkeypatch):
+class Parabolas(Problem):
+    """m paraboloids of three variables, with a constraint that nothing satisfies unless it is `feasible`."""
+
+    def __init__(self, m, feasible):
+        super().__init__(n_var=3, n_obj=m, n_ieq_constr=1, xl=0.0, xu=1.0)
+        self.excess = -1.0 if feasible else 1.0
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        out["F"] = np.stack([((X - k / self.n_obj) ** 2).sum(axis=1) for k in range(self.n_obj)], axis=1)
+        out["G"] = self.excess + 0.1 * X[:, :1]
+
+
+@pytest.mark.parametrize(
+    ("m", "feasible", "index"),
+    [
+        (2, True, breeding.INDEX_MUTATION),
+        (3, True, breeding.INDEX_MUTATION),
+        (4, True, breeding.INDEX_MUTATION_MANY),
+        (2, False, breeding.INDEX_MUTATION_INFEASIBLE),
+        (4, False, breeding.INDEX_MUTATION_INFEASIBLE),
+    ],
+)
+def test_mutation_takes_longer_steps_with_many_objectives_and_as_long_as_nothing_is_feasible(m, feasible, index, monkeypatch):
     seen = set()
 
     def noted(X, rng, index):
@@ -114,10 +137,16 @@ def test_mutation_takes_longer_steps_with_many_objectives(m, index, monkeypatch)
         return X
 
     monkeypatch.setattr(breeding, "mutate", noted)
-    MACS().minimize(
-        lambda X: np.stack([((X - k / m) ** 2).sum(axis=1) for k in range(m)], axis=1), [(0.0, 1.0)] * 3, evaluations=300, seed=1
-    )
+    MACS().minimize(Parabolas(m, feasible), evaluations=300, seed=1)
     assert seen == {index}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 9])
+def test_a_constraint_with_many_local_optima_is_satisfied(seed):
+    """C1-DTLZ1 (Jain and Deb 2014): feasible is only what is near the front. With shorter steps these two of ten searches found two
+    feasible points, or none."""
+    assert len(MACS(archive=100).minimize(get_problem("c1dtlz1"), evaluations=30_000, seed=seed)) == 100
 
 
 def test_operators_that_succeed_get_more_and_none_gets_nothing():
