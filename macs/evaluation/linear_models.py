@@ -20,6 +20,10 @@ MOST = 40
 """Most points that a model is made of; else two for each variable and two more."""
 FLAT, ALIKE = 1e-6, 1e-3
 """Singular values below these parts of the largest count as zero: of the points around, of the gradients of unit length."""
+CLEARLY = 0.1
+"""A constraint counts as a limit on an absolute value where this lowers the misfit of its model to this part."""
+FOLDS = 5
+"""Models of such a constraint: with each the signs of its residuals are chosen anew."""
 BEYOND = 0.02
 """Part of the residuals by which a step goes beyond the zero of their models, so that it ends inside of limits."""
 
@@ -78,15 +82,44 @@ def steps_to_zero(box: Box, X: np.ndarray, residuals: np.ndarray, samples: Sampl
         if len(near) and len(violated):
             apart, amount = np.sqrt(squared[row, near]), residuals[row, violated]
             with np.errstate(over="ignore", invalid="ignore"):  # a slope that is no finite number is left out
-                slopes = _gradients(box.difference(samples.X[near], X[row]), samples.residuals[near][:, violated] - amount, apart)
-                step = _step(box, X[row], amount, slopes)
+                gradients = _gradients(box.difference(samples.X[near], X[row]), samples.residuals[near][:, violated], amount, apart)
+                step = _step(box, X[row], amount, gradients)
             steps[row] = step * min(1.0, apart.max() / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
     return steps
 
 
-def _gradients(steps: np.ndarray, change: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Gradients (c, d) of the linear models of changes (n, c) by steps (n, d) of lengths `apart` (n,), by which they are divided."""
-    return (np.linalg.pinv(steps / apart[:, None], rcond=FLAT) @ (change / apart[:, None])).T
+def _gradients(steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Gradients (c, d) of the linear models of residuals (n, c) at steps (n, d) of lengths `apart` (n,) from a point with the residuals
+    `amount` (c,).
+
+    A limit such as abs(h(x)) <= 0.0001 has positive residuals on both sides of h(x) = 0. Where no residual is negative, some of them
+    therefore count as negative, if the model fits much better then.
+    """
+    weighted = steps / apart[:, None]
+    inverse = np.linalg.pinv(weighted, rcond=FLAT)
+
+    def fitted(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gradients (..., d, c) of the models of values (..., n, c), and their squared misfits (..., c)."""
+        change = (values - amount) / apart[:, None]
+        slopes = inverse @ change
+        return slopes, np.square(weighted @ slopes - change).sum(axis=-2)
+
+    slopes, misfit = fitted(residuals)
+    maybe = np.flatnonzero((residuals >= 0.0).all(axis=0) & (amount > 0.0))
+    if maybe.size:
+        residuals, amount, misfit = residuals[:, maybe], amount[maybe], CLEARLY * misfit[maybe]
+        columns = np.arange(len(maybe))
+        # First guesses: all points are on the other side; or one is, and the model has the slope from here to it.
+        along = (steps @ steps.T / apart[:, None] ** 2)[:, :, None]
+        model = np.concatenate([np.full((1, *residuals.shape), -1.0), amount - along * (amount + residuals[:, None])])
+        for _ in range(FOLDS):
+            found, misfits = fitted(np.where(model < 0.0, -residuals, residuals))
+            best = misfits.argmin(axis=0)
+            better = misfits[best, columns] < misfit
+            slopes[:, maybe[better]] = found[best, :, columns][better].T
+            misfit = np.where(better, misfits[best, columns], misfit)
+            model = amount + steps @ found
+    return slopes.T
 
 
 def _step(box: Box, x: np.ndarray, amount: np.ndarray, gradients: np.ndarray) -> np.ndarray:

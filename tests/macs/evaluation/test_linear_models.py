@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from macs.evaluation import linear_models
 from macs.evaluation.box import Box
 from macs.evaluation.linear_models import BEYOND, MEMORY, Samples, steps_to_zero
 
@@ -39,6 +40,40 @@ def test_constraints_without_a_residual_have_no_part():
     step = steps_to_zero(box(3), x[None], np.array([[0.1, 0.0]]), known)[0]
     assert step == pytest.approx([-0.1 * (1.0 + BEYOND), 0.0, 0.0], abs=1e-9)
     assert x[0] + step[0] < 0.4 - 1e-3, "inside of the limit"
+
+
+@pytest.mark.parametrize(("d", "most"), [(1, 0.9), (2, 0.9), (4, 0.8), (8, 0.5)])
+def test_limits_on_absolute_values_are_met_from_either_side(d, most, monkeypatch):
+    """abs(a x - b) <= 0 has a kink at the plane. With points on both sides most steps end on the plane, and few without signs."""
+    rng, x = np.random.default_rng(d), np.full(d, 0.5)
+    met, without_signs = [], []
+    for _ in range(100):
+        a = rng.standard_normal(d)
+        b = a @ x + 0.03 * np.linalg.norm(a) * rng.choice([-1.0, 1.0])
+        known = around(x, 0.1, 2 * d + 2, lambda X, a=a, b=b: np.abs(X @ a - b)[:, None], rng)
+        amount = np.abs(a @ x - b)[None, None]
+        met.append(abs(a @ (x + steps_to_zero(box(d), x[None], amount, known)[0]) - b) < 0.021 * amount)
+        with monkeypatch.context() as alone:
+            alone.setattr(linear_models, "FOLDS", 0)
+            without_signs.append(abs(a @ (x + steps_to_zero(box(d), x[None], amount, known)[0]) - b) < 0.021 * amount)
+    assert np.mean(met) > most and np.mean(without_signs) < 0.25
+
+
+@pytest.mark.parametrize("d", [1, 4, 16])
+def test_limits_on_one_side_are_not_taken_for_absolute_values(d, monkeypatch):
+    """Curved, with points on both sides, near and far: the same steps as without trying other signs, for 99 %."""
+    rng, x = np.random.default_rng(d), np.full((1, d), 0.5)
+    changed = 0
+    for k in range(200):
+        centre, side = 0.5 + 0.3 * rng.uniform(-1.0, 1.0, d), rng.choice([-1.0, 1.0])
+        limit = ((x - centre) ** 2).sum() - side * (0.001, 0.01, 0.1)[k % 3]
+        ball = lambda X, c=centre, r=limit, s=side: np.maximum(s * (((X - c) ** 2).sum(axis=1, keepdims=True) - r), 0.0)  # noqa: E731
+        known = around(x[0], (0.02, 0.1, 0.3)[k // 3 % 3], 2 * d + 2, ball, rng)
+        step = steps_to_zero(box(d), x, ball(x), known)
+        with monkeypatch.context() as without:
+            without.setattr(linear_models, "FOLDS", 0)
+            changed += not np.array_equal(step, steps_to_zero(box(d), x, ball(x), known))
+    assert changed <= 2
 
 
 def test_variables_at_a_bound_leave_the_rest_to_the_others():

@@ -49,10 +49,12 @@ def test_a_front_on_a_thin_feasible_set_is_covered(seed):
 
 
 @pytest.mark.slow
-def test_equalities_that_are_stated_as_a_band_of_absolute_values():
-    """Their residuals have one sign on both sides, which makes models worse, not useless."""
-    front = MACS(archive=30).minimize(Sphere(4, "G"), evaluations=20_000, seed=1, progress=False)
-    assert len(front) == 30 and off_the_arc(front.F)[1] < 0.5
+@pytest.mark.parametrize(("d", "seed"), [(4, 1), (4, 2), (8, 1)])
+def test_equalities_that_are_stated_as_a_limit_on_absolute_values(d, seed):
+    """Their residuals do not say on which side a point is. Before models had signs, gaps were up to 0.7 wide."""
+    front = MACS(archive=30).minimize(Sphere(d, "G"), evaluations=20_000, seed=seed, progress=False)
+    far, gap = off_the_arc(front.F)
+    assert len(front) == 30 and far.max() < 0.05 and gap < 0.2
 
 
 @pytest.mark.slow
