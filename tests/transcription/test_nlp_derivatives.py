@@ -12,7 +12,9 @@ from euler import Euler
 
 from problems import Problem, load
 from transcription import DFET, NLP, MultipleShooting
+from transcription.nlp import from_points
 from transcription.nlp.derivatives import gradients, hessian, objective_gradients
+from transcription.nlp.from_points import FromPoints
 from transcription.phases.mesh import PhaseMesh
 
 
@@ -49,9 +51,31 @@ def smooth() -> Problem:
     return problem
 
 
+def designed() -> Problem:
+    """Two phases of a vehicle whose size takes more operations than its motion."""
+    problem = Problem("designed")
+    a, b = (problem.parameter(name, bounds=(0.5, 2)) for name in "ab")
+    area, volume = ca.sqrt(a**3 + ca.sin(b) ** 2) * ca.exp(-a * b), ca.log(1 + a**2 * b) * ca.tanh(a - b) + ca.cos(a * b)
+    phases = []
+    for name, begin in (("up", 0.0), ("down", (0.5, 3.0))):
+        phase = problem.phase(name, t0=begin, tf=(0.5, 3.0) if name == "up" else (2.0, 5.0))
+        x, v = phase.state("x", bounds=(-3, 3), initial=1.0 if name == "up" else None), phase.state("v", bounds=(-3, 3))
+        u = phase.control("u", bounds=(-1, 1))
+        phase.dynamics(x=v, v=u - area * v**2 * ca.sin(x) - volume * x + a)
+        phase.path("load", area * ca.exp(x) * v, upper=5)
+        phases.append(phase)
+    problem.link(*phases)
+    problem.constraint("size", area * volume + phases[1].integral(phases[1]["u"] ** 2 * volume), upper=9)
+    problem.minimize("end", phases[1].tf * volume)
+    problem.minimize("area", area)
+    return problem
+
+
 CASES = {
     "everything": (everything, DFET(2, 2)),
     "everything, Bernstein": (everything, DFET(2, 3, control_order=1, basis="bernstein")),
+    "a design in common": (designed, DFET(3, 2)),
+    "a design in common, moving edges": (designed, DFET(2, 2, mesh={"up": ((0.0, 0.2, 0.4, 1.0), 2, None, (1, 2))})),
     "constants": (oscillator, DFET(1, 0)),
     "moving edges": (smooth, DFET(2, 2, mesh={"swing": ((0.0, 0.1, 0.35, 0.6, 1.0), 3, None, (1, 3))})),
     "arcs": (smooth, DFET(2, 2, mesh={"swing": PhaseMesh((0.0, 0.3, 0.6, 1.0), 2, None, (1,), (("u", (0,)),))})),
@@ -97,6 +121,19 @@ def test_they_are_as_sparse(case):
     for function, i in ((gradients, 0), (gradients, 1), (hessian, 0)):
         own, other = (function(one).sparsity_out(i).nnz() for one in (nlp, replace(nlp, parts=None)))
         assert 0 < own <= 1.02 * other
+
+
+def test_a_design_is_derived_once_for_all_points(monkeypatch):
+    """Its derivatives are then none of those at points, which take fewer operations."""
+
+    def operations() -> int:
+        points = FromPoints(nlp, nlp.parts)._frame.points
+        return sum(one.slopes.n_instructions() + one.curvature()[0].n_instructions() for one in points)
+
+    nlp = DFET(3, 2).transcribe(designed())
+    once = operations()
+    monkeypatch.setattr(from_points, "SHARED", np.inf)
+    assert once < 0.5 * operations()
 
 
 def test_values_beside_derivatives_are_those_of_the_nlp():

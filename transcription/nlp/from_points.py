@@ -12,21 +12,36 @@ import numpy as np
 from ..base import NLP
 from ..phases.pointwise import Parts
 
+SHARED = 0.25
+"""What points have in common is evaluated once for all where it is at least this part of the instructions of one point."""
+
 
 class FromPoints:
     """Derivatives of an NLP that has parts, in a symbol `z` of its variables.
 
-    With y = A z + b at all points, w = f(y), rows L = C w + D z and quantities q = C' w + D' z, all but f' and f'' are constants.
+    With y = A z + b at all points, w = f(y), rows L = C w + D z and quantities q = C' w + D' z, all but f' and f'' are constants. Where
+    much of f depends on inputs p alone that are the same at all points, as on the shape of a vehicle, it is evaluated once: w = f(y, u(p)),
+    and A has rows u'(p) dp/dz.
     """
 
     def __init__(self, nlp: NLP, parts: Parts) -> None:
         self.z = ca.MX.sym("z", len(nlp.variables))
         self._frame = frame = _framed(parts, self.z)
-        inputs = parts.inputs.call([self.z])
-        self._inputs = [(y[one.vary, :], y[one.fixed, :]) for one, y in zip(frame.points, inputs, strict=True)]
+        self._inputs, self._shared, A = list[tuple[ca.MX, ca.MX]](), list[tuple[ca.MX, _Common]](), ca.MX(frame.A)
+        for one, common, y in zip(frame.points, frame.common, parts.inputs.call([self.z]), strict=True):
+            v = y[one.vary, :]
+            if common is not None:
+                p = y[common.of, 0]
+                u, slopes = common.slopes(p)
+                v = ca.vertcat(v, ca.repmat(u, 1, y.shape[1]))
+                A += _product(common.to, _product(slopes, common.A))
+                self._shared.append((p, common))
+            self._inputs.append((v, y[one.fixed, :]))
+        self._A = A if self._shared else frame.A
         found = [one.slopes.map(v.shape[1])(v, rest) for one, (v, rest) in zip(frame.points, self._inputs, strict=True)]
         self.rows, self.q = parts.affine.call([self.z, *(w for w, _ in found)])
-        self._values_by_z = _product(ca.MX(frame.slopes, ca.veccat(*(slopes for _, slopes in found))), frame.A)
+        self._slopes = ca.MX(frame.slopes, ca.veccat(*(slopes for _, slopes in found)))
+        self._values_by_z = _product(self._slopes, self._A)
 
     def gradients(self) -> list[ca.MX]:
         """dF/dz, dg/dz, F and g."""
@@ -48,7 +63,10 @@ class FromPoints:
             halves.append(curvature.map(k)(v, rest, ca.reshape(of_values[first : first + size * k], size, k)))
             sparsities.append((sparsity, k))
             first += size * k
-        H = _product(frame.A.T, _product(ca.MX(_diagonal(sparsities), ca.veccat(*halves)), frame.A))
+        H = _product(self._A.T, _product(ca.MX(_diagonal(sparsities), ca.veccat(*halves)), self._A))
+        for p, common in self._shared:
+            of_u = ca.densify(_product(_product(self._slopes, common.to).T, of_values))
+            H += _product(common.A.T, _product(common.curvature(p, of_u), common.A))
         if frame.curved:
             q = self._by_z([part[frame.curved, :] for part in frame.quantities])
             H += _product(q.T, _product(frame.curvature(self.q, of_scores), q))
@@ -64,27 +82,68 @@ class FromPoints:
         return slopes[0] + _product(slopes[1], self._values_by_z)
 
 
+@dataclass(frozen=True, eq=False)
+class _Common:
+    """What a Function has in common at all of its points: u(p).
+
+    Attributes
+    ----------
+    of : list of int
+        Which inputs are p.
+    slopes : Function
+        p -> (u, du/dp).
+    curvature : Function
+        (p, of_u) -> half of the Hessian of of_u'u.
+    A : DM
+        dp/dz.
+    to : DM
+        Derivatives by u of all inputs that vary, at all points of all Functions.
+    """
+
+    of: list[int]
+    slopes: ca.Function
+    curvature: ca.Function
+    A: ca.DM
+    to: ca.DM
+
+
 class _Point:
     """A Function at one point, where some of its inputs vary with z and the others do not.
+
+    Parameters
+    ----------
+    function : Function
+        y -> w.
+    vary, alike : arrays of int
+        Which inputs vary, and which of these are the same at all points.
 
     Attributes
     ----------
     vary, fixed : list of int
-        Which of its inputs do which.
+    u : list
+        Expressions of those inputs that vary and are the same at all points, where they are worth to be evaluated once for all; these are
+        further inputs that vary, after the others.
+    count : int
+        Number of inputs that vary, with these.
     slopes : Function
         (varying, fixed) -> (w, nonzeros of its Jacobian by those that vary).
     sparsity : Sparsity
         Of this Jacobian.
     """
 
-    def __init__(self, function: ca.Function, vary: np.ndarray) -> None:
+    def __init__(self, function: ca.Function, vary: np.ndarray, alike: np.ndarray) -> None:
         size, kind = function.numel_in(0), kind_of(function)
         fixed = np.setdiff1d(np.arange(size), vary)
         self.vary, self.fixed = vary.tolist(), fixed.tolist()
-        self._symbols = kind.sym("v", len(vary)), kind.sym("c", len(fixed)), kind.sym("of_w", function.numel_out(0))
-        v, rest, _ = self._symbols
-        self._values = function(ca.vertcat(v, rest)[np.argsort(np.concatenate([vary, fixed])).tolist()])
-        J = ca.jacobian(self._values, v)
+        v, rest, of_w = kind.sym("v", len(vary)), kind.sym("c", len(fixed)), kind.sym("of_w", function.numel_out(0))
+        values = function(ca.vertcat(v, rest)[np.argsort(np.concatenate([vary, fixed])).tolist()])
+        p, self.u = v[np.flatnonzero(np.isin(vary, alike)).tolist()], list[Any]()
+        if kind is ca.SX and p.numel():
+            kept, symbols, u = ca.extract_parametric(values, p)
+            if u and ca.Function("u", [p], u).n_instructions() >= SHARED * function.n_instructions():
+                v, values, self.u = ca.vertcat(v, *symbols), kept, [p, ca.vertcat(*u)]
+        self._symbols, self._values = (v, rest, of_w), values
+        self.count, J = v.numel(), ca.jacobian(self._values, v)
         self.slopes, self.sparsity = ca.Function("slopes", [v, rest], [self._values, J.nz[:]]), J.sparsity()
 
     def curvature(self) -> tuple[ca.Function, ca.Sparsity]:
@@ -103,6 +162,8 @@ class _Frame:
     Attributes
     ----------
     points : list of _Point
+    common : list of _Common or None
+        Of each of these.
     A : DM
         Derivatives by z of all inputs that vary, at all points.
     slopes : Sparsity
@@ -117,6 +178,7 @@ class _Frame:
     """
 
     points: list[_Point]
+    common: list[_Common | None]
     A: ca.DM
     slopes: ca.Sparsity
     rows: tuple[ca.DM, ca.DM]
@@ -129,20 +191,51 @@ class _Frame:
 def _framed(parts: Parts, z: ca.MX) -> _Frame:
     inputs = parts.inputs.call([z], True, False)
     A = ca.vertsplit(_constant(ca.veccat(*inputs), z), np.cumsum([0, *(y.numel() for y in inputs)]).tolist())
-    points, varying, sparsities = [], [], []
-    for function, y, by_z in zip(parts.points, inputs, A, strict=True):
+    begins = parts.inputs.call([ca.DM.zeros(z.numel())])
+    points, varying, sparsities, alike = [], [], [], []
+    for function, y, begin, by_z in zip(parts.points, inputs, begins, A, strict=True):
         size, k = y.shape
         vary = np.unique(np.array(by_z.sparsity().row(), dtype=int) % size)
-        points.append(_Point(function, vary))
-        sparsities.append((points[-1].sparsity, k))
-        varying.append(by_z[(vary[None] + size * np.arange(k)[:, None]).ravel().tolist(), :])
+        alike.append(np.intersect1d(vary, _alike(ca.horzcat(by_z, ca.vec(begin)), size)))
+        points.append(one := _Point(function, vary, alike[-1]))
+        sparsities.append((one.sparsity, k))
+        rows = by_z[(vary[None] + size * np.arange(k)[:, None]).ravel().tolist(), :]
+        if one.u:
+            none = ca.DM(one.count - len(vary), z.numel())
+            rows = ca.vertcat(*(part for own in ca.vertsplit(rows, len(vary)) for part in (own, none)))
+        varying.append(rows)
+    sizes = [rows.shape[0] for rows in varying]
+    common = [
+        _common(one, own, by_z[own.tolist(), :], before, sum(sizes), k)
+        for one, own, by_z, before, (_, k) in zip(points, alike, A, np.cumsum([0, *sizes[:-1]]), sparsities, strict=True)
+    ]
     values = [ca.MX.sym("w", *parts.affine.size_in(i + 1)) for i in range(len(points))]
     joined = ca.MX.sym("w", sum(value.numel() for value in values))
     split = ca.vertsplit(joined, np.cumsum([0, *(value.numel() for value in values)]).tolist())
     values = [ca.reshape(one, *value.shape) for one, value in zip(split, values, strict=True)]
     L, q = parts.affine.call([z, *values], True, False)
     rows, quantities = ((_constant(one, z, joined), _constant(one, joined, z)) for one in (L, q))
-    return _Frame(points, ca.vertcat(*varying), _diagonal(sparsities), rows, quantities, *_curved(parts.scores))
+    return _Frame(points, common, ca.vertcat(*varying), _diagonal(sparsities), rows, quantities, *_curved(parts.scores))
+
+
+def _alike(rows: ca.DM, size: int) -> np.ndarray:
+    """Which of the rows of several blocks of so many rows are the same in all blocks."""
+    count = rows.shape[0] // size
+    unlike = ca.sparsify(rows - ca.repmat(rows[:size, :], count, 1))
+    return np.setdiff1d(np.arange(size), np.array(unlike.sparsity().row(), dtype=int) % size) if count > 1 else np.empty(0, dtype=int)
+
+
+def _common(one: _Point, of: np.ndarray, A: ca.DM, before: int, size: int, k: int) -> _Common | None:
+    """What a Function has in common at its k points, whose inputs that vary come after so many and are among so many of all Functions."""
+    if not one.u:
+        return None
+    p, u = one.u
+    of_u = ca.SX.sym("of_u", u.numel())
+    slopes = ca.Function("slopes", [p], [u, ca.jacobian(u, p)])
+    curvature = ca.Function("curvature", [p, of_u], [0.5 * ca.hessian(ca.dot(of_u, u), p)[0]])
+    each = ca.vertcat(ca.DM(len(one.vary), u.numel()), ca.DM.eye(u.numel()))
+    to = ca.vertcat(ca.DM(before, u.numel()), ca.repmat(each, k, 1), ca.DM(size - before - k * each.shape[0], u.numel()))
+    return _Common(of.tolist(), slopes, curvature, A, to)
 
 
 def _diagonal(blocks: Sequence[tuple[ca.Sparsity, int]]) -> ca.Sparsity:
