@@ -20,7 +20,7 @@ MOST = 40
 """Most points that a model is made of; else two for each variable and two more."""
 FLAT, ALIKE = 1e-6, 1e-3
 """Singular values below these parts of the largest count as zero: of the points around, of the gradients of unit length."""
-CLEARLY = 0.1
+CLEARLY = 0.03
 """A constraint counts as a limit on an absolute value where this lowers the misfit of its model to this part."""
 FOLDS = 5
 """Models of such a constraint: with each the signs of its residuals are chosen anew."""
