@@ -98,7 +98,18 @@ TRUST = "load problems and references that the files name by address, outside th
 class Parser(argparse.ArgumentParser):
     """One line for a wrong call, not a page of usage."""
 
+    _given: Sequence[str] = ()
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse's, with the arguments kept for `error`."""
+        self._given = args or ()
+        return super().parse_known_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
+        """End with a message, which says so where an option that takes several values has taken what is missing."""
+        several = [name for action in self._actions if action.nargs == "+" for name in action.option_strings if name in self._given]
+        if several and "arguments are required" in message:
+            message += f": write them before {several[0]}, which takes all values after it"
         raise SystemExit(complain(message, self.prog))
 
 

@@ -65,6 +65,15 @@ def test_run_resume_and_status(capsys):
     assert "contains no study but other things" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("call", "words"), [(["--solvers", "MACS", "goddard-table3"], "write them before --solvers"), ([], "STUDY\n")])
+def test_a_study_that_is_missing(call, words, capsys):
+    """An option that takes several labels takes the study after them, too."""
+    with pytest.raises(SystemExit):
+        main(["study", "run", *call])
+    said = capsys.readouterr().err
+    assert "required: STUDY" in said and words in said
+
+
 @pytest.mark.slow
 def test_the_runs_of_some_solvers(capsys):
     Path("two.toml").write_text(TOML + '[solvers.other]\nsolver = "macs"\nrefine = false\n')
