@@ -17,7 +17,7 @@ from .box import Box
 MEMORY = 500
 """Most points that are kept, the last ones."""
 MOST = 40
-"""Most points that a model is made of; else two for each variable and two more."""
+"""Most points that a model is made of; else two for each variable and two more. Signs are found from twice as many."""
 FLAT, ALIKE = 1e-6, 1e-3
 """Singular values below these parts of the largest count as zero: of the points around, of the gradients of unit length."""
 CLEARLY = 0.03
@@ -74,7 +74,8 @@ def steps_to_zero(box: Box, X: np.ndarray, residuals: np.ndarray, samples: Sampl
     """
     squared = box.squared_distances(X, samples.X)
     squared[squared == 0.0] = np.inf
-    order = np.argsort(squared, axis=1, kind="stable")[:, : min(2 * X.shape[1] + 2, MOST)]
+    count = min(2 * X.shape[1] + 2, MOST)
+    order = np.argsort(squared, axis=1, kind="stable")[:, : 2 * count]
     steps = np.zeros_like(X)
     for row, near in enumerate(order):
         near = near[np.isfinite(squared[row, near])]
@@ -82,44 +83,63 @@ def steps_to_zero(box: Box, X: np.ndarray, residuals: np.ndarray, samples: Sampl
         if len(near) and len(violated):
             apart, amount = np.sqrt(squared[row, near]), residuals[row, violated]
             with np.errstate(over="ignore", invalid="ignore"):  # a slope that is no finite number is left out
-                gradients = _gradients(box.difference(samples.X[near], X[row]), samples.residuals[near][:, violated], amount, apart)
+                gradients = _gradients(box.difference(samples.X[near], X[row]), samples.residuals[near][:, violated], amount, apart, count)
                 step = _step(box, X[row], amount, gradients)
-            steps[row] = step * min(1.0, apart.max() / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
+            steps[row] = step * min(1.0, apart[:count].max() / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
     return steps
 
 
-def _gradients(steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, apart: np.ndarray) -> np.ndarray:
+def _gradients(steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, apart: np.ndarray, count: int) -> np.ndarray:
     """Gradients (c, d) of the linear models of residuals (n, c) at steps (n, d) of lengths `apart` (n,) from a point with the residuals
-    `amount` (c,).
+    `amount` (c,); of the first `count` of these.
 
     A limit such as abs(h(x)) <= 0.0001 has positive residuals on both sides of h(x) = 0. Where no residual is negative, some of them
-    therefore count as negative, if the model fits much better then.
+    therefore count as negative, if a model of all of them fits far better then.
     """
-    weighted = steps / apart[:, None]
-    inverse = np.linalg.pinv(weighted, rcond=FLAT)
-
-    def fitted(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gradients (..., d, c) of the models of values (..., n, c), and their squared misfits (..., c)."""
-        change = (values - amount) / apart[:, None]
-        slopes = inverse @ change
-        return slopes, np.square(weighted @ slopes - change).sum(axis=-2)
-
-    slopes, misfit = fitted(residuals)
+    fit = _Fit(steps[:count], apart[:count])
+    slopes = fit(residuals[:count] - amount)[0]
     maybe = np.flatnonzero((residuals >= 0.0).all(axis=0) & (amount > 0.0))
     if maybe.size:
-        residuals, amount, misfit = residuals[:, maybe], amount[maybe], CLEARLY * misfit[maybe]
-        columns = np.arange(len(maybe))
-        # First guesses: all points are on the other side; or one is, and the model has the slope from here to it.
-        along = (steps @ steps.T / apart[:, None] ** 2)[:, :, None]
-        model = np.concatenate([np.full((1, *residuals.shape), -1.0), amount - along * (amount + residuals[:, None])])
-        for _ in range(FOLDS):
-            found, misfits = fitted(np.where(model < 0.0, -residuals, residuals))
-            best = misfits.argmin(axis=0)
-            better = misfits[best, columns] < misfit
-            slopes[:, maybe[better]] = found[best, :, columns][better].T
-            misfit = np.where(better, misfits[best, columns], misfit)
-            model = amount + steps @ found
+        signs = _signs(steps, residuals[:, maybe], amount[maybe], apart)
+        folded = np.flatnonzero((signs < 0.0).any(axis=0))
+        which = maybe[folded]
+        slopes[:, which] = fit((signs[:, folded] * residuals[:, which])[:count] - amount[which])[0]
     return slopes.T
+
+
+class _Fit:
+    """Linear models by steps (n, d) of lengths `apart` (n,), by the square of which residuals are divided."""
+
+    def __init__(self, steps: np.ndarray, apart: np.ndarray) -> None:
+        self._steps, self._apart = steps / apart[:, None], apart[:, None]
+        self._inverse = np.linalg.pinv(self._steps, rcond=FLAT)
+
+    def __call__(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gradients (..., d, c) that fit changes (..., n, c) best, and the squared misfits (..., c)."""
+        change = change / self._apart
+        slopes = self._inverse @ change
+        return slopes, np.square(self._steps @ slopes - change).sum(axis=-2)
+
+
+def _signs(steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Signs (n, c) of residuals with which models fit far better; 1 where none do. See `_gradients`.
+
+    Each is that of the model before, from several first guesses: all points are on the other side, or one is, and the model has the slope
+    from here to it.
+    """
+    fit, columns = _Fit(steps, apart), np.arange(len(amount))
+    signs, least = np.ones_like(residuals), CLEARLY * fit(residuals - amount)[1]
+    along = (steps @ steps.T / apart[:, None] ** 2)[:, :, None]
+    model = np.concatenate([np.full((1, *residuals.shape), -1.0), amount - along * (amount + residuals[:, None])])
+    for _ in range(FOLDS):
+        tried = np.where(model < 0.0, -1.0, 1.0)
+        found, misfits = fit(tried * residuals - amount)
+        best = misfits.argmin(axis=0)
+        better = misfits[best, columns] < least
+        signs[:, better] = tried[best, :, columns][better].T
+        least = np.where(better, misfits[best, columns], least)
+        model = amount + steps @ found
+    return signs
 
 
 def _step(box: Box, x: np.ndarray, amount: np.ndarray, gradients: np.ndarray) -> np.ndarray:
