@@ -18,7 +18,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from misbehaving import Crashing, Plain, Slow, glide
+from misbehaving import Crashing, Gated, Plain, Slow, glide
 from synthetic_fronts import black_box, flights
 from test_study import Inline
 
@@ -404,8 +404,11 @@ def test_ctrl_c_ends_the_server_quietly_and_an_open_address_is_warned_of(out):
 
 @pytest.mark.slow
 def test_a_study_goes_on_when_its_server_is_killed(tmp_path):
-    stated = Study("slow", problems={"glide": glide()}, solvers={"slow": Slow()}, evaluations=60, runs=4, seed=1)
+    gate = tmp_path / "gate"
+    stated = Study("gated", problems={"glide": glide()}, solvers={"gated": Gated(gate=str(gate))}, evaluations=60, runs=4, seed=1)
+    gate.touch()
     expected = [run.front.F.tolist() for run in stated.run(tmp_path / "alone").runs]
+    gate.unlink()
     found = []
     runner = threading.Thread(target=lambda: found.append(stated.run(tmp_path / "out")))
     runner.start()
@@ -418,5 +421,6 @@ def test_a_study_goes_on_when_its_server_is_killed(tmp_path):
         server.kill()
         server.wait()
         assert runner.is_alive()
+    gate.touch()
     runner.join()
     assert [run.front.F.tolist() for run in found[0].runs] == expected and found[0].finished == 4
