@@ -20,10 +20,11 @@ MOST = 40
 """Most points that a model is made of; else two for each variable and two more. Signs are found from twice as many."""
 FLAT, ALIKE = 1e-6, 1e-3
 """Singular values below these parts of the largest count as zero: of the points around, of the gradients of unit length."""
-CLEARLY = 0.03
-"""A constraint counts as a limit on an absolute value where this lowers the misfit of its model to this part."""
-FOLDS = 5
-"""Models of such a constraint: with each the signs of its residuals are chosen anew."""
+POOR, CLEARLY = 0.01, 0.03
+"""A constraint may be a limit on an absolute value where the misfit of its model is more than this part of the squared changes, and counts
+as one where this lowers the misfit to this part."""
+FOLDS, GUESSES = 5, 3
+"""Models of such a constraint, with each of which the signs of its residuals are chosen anew; and how many of the first go on."""
 BEYOND = 0.02
 """Part of the residuals by which a step goes beyond the zero of their models, so that it ends inside of limits."""
 
@@ -98,9 +99,11 @@ def _gradients(steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, apa
     """
     fit = _Fit(steps[:count], apart[:count])
     slopes = fit(residuals[:count] - amount)[0]
-    maybe = np.flatnonzero((residuals >= 0.0).all(axis=0) & (amount > 0.0))
+    whole = _Fit(steps, apart)
+    misfit, total = whole(residuals - amount)[1], np.square((residuals - amount) / apart[:, None]).sum(axis=0)
+    maybe = np.flatnonzero((residuals >= 0.0).all(axis=0) & (amount > 0.0) & (misfit > POOR * total))
     if maybe.size:
-        signs = _signs(steps, residuals[:, maybe], amount[maybe], apart)
+        signs = _signs(whole, steps, residuals[:, maybe], amount[maybe], CLEARLY * misfit[maybe])
         folded = np.flatnonzero((signs < 0.0).any(axis=0))
         which = maybe[folded]
         slopes[:, which] = fit((signs[:, folded] * residuals[:, which])[:count] - amount[which])[0]
@@ -121,15 +124,14 @@ class _Fit:
         return slopes, np.square(self._steps @ slopes - change).sum(axis=-2)
 
 
-def _signs(steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Signs (n, c) of residuals with which models fit far better; 1 where none do. See `_gradients`.
+def _signs(fit: _Fit, steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Signs (n, c) of residuals (n, c), 1 or -1, with which models have misfits below `least` (c,); 1 where none have. See `_gradients`.
 
-    Each is that of the model before, from several first guesses: all points are on the other side, or one is, and the model has the slope
-    from here to it.
+    Each is that of the model before, from several first guesses, of which the best go on: all points are on the other side, or one is, and
+    the model has the slope from here to it.
     """
-    fit, columns = _Fit(steps, apart), np.arange(len(amount))
-    signs, least = np.ones_like(residuals), CLEARLY * fit(residuals - amount)[1]
-    along = (steps @ steps.T / apart[:, None] ** 2)[:, :, None]
+    signs, columns = np.ones_like(residuals), np.arange(len(amount))
+    along = (steps @ steps.T / np.square(steps).sum(axis=1)[:, None])[:, :, None]
     model = np.concatenate([np.full((1, *residuals.shape), -1.0), amount - along * (amount + residuals[:, None])])
     for _ in range(FOLDS):
         tried = np.where(model < 0.0, -1.0, 1.0)
@@ -138,7 +140,8 @@ def _signs(steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, apart: 
         better = misfits[best, columns] < least
         signs[:, better] = tried[best, :, columns][better].T
         least = np.where(better, misfits[best, columns], least)
-        model = amount + steps @ found
+        go_on = np.argsort(misfits, axis=0)[:GUESSES]
+        model = amount + steps @ np.moveaxis(found[go_on, :, columns], 2, 1)
     return signs
 
 
