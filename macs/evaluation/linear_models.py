@@ -20,11 +20,12 @@ MOST = 40
 """Most points that a model is made of; else two for each variable and two more. Signs are found from twice as many."""
 FLAT, ALIKE = 1e-6, 1e-3
 """Singular values below these parts of the largest count as zero: of the points around, of the gradients of unit length."""
-POOR, CLEARLY = 0.01, 0.03
+POOR, CLEARLY = 1e-4, 0.03
 """A constraint may be a limit on an absolute value where the misfit of its model is more than this part of the squared changes, and counts
 as one where this lowers the misfit to this part."""
-FOLDS, GUESSES = 5, 3
-"""Models of such a constraint, with each of which the signs of its residuals are chosen anew; and how many of the first go on."""
+FOLDS, GUESSES = 5, 300
+"""Models of such a constraint, with each of which the signs of its residuals are chosen anew; and how many of the first models go on, of all
+such constraints together, but at least three of each."""
 BEYOND = 0.02
 """Part of the residuals by which a step goes beyond the zero of their models, so that it ends inside of limits."""
 
@@ -140,7 +141,7 @@ def _signs(fit: _Fit, steps: np.ndarray, residuals: np.ndarray, amount: np.ndarr
         better = misfits[best, columns] < least
         signs[:, better] = tried[best, :, columns][better].T
         least = np.where(better, misfits[best, columns], least)
-        go_on = np.argsort(misfits, axis=0)[:GUESSES]
+        go_on = np.argsort(misfits, axis=0)[: max(GUESSES // len(columns), 3)]
         model = amount + steps @ np.moveaxis(found[go_on, :, columns], 2, 1)
     return signs
 

@@ -57,12 +57,27 @@ def test_equalities_that_are_stated_as_a_limit_on_absolute_values(d, seed):
     assert len(front) == 30 and far.max() < 0.05 and gap < 0.2
 
 
+class Banded(Problem):
+    """A problem whose equalities h = 0 are stated as abs(h) - 1e-4 <= 0."""
+
+    def __init__(self, stated: Problem) -> None:
+        super().__init__(
+            n_var=stated.n_var, n_obj=stated.n_obj, n_ieq_constr=stated.n_ieq_constr + stated.n_eq_constr, xl=stated.xl, xu=stated.xu
+        )
+        self.stated = stated
+
+    def _evaluate(self, x, out, *args, **kwargs) -> None:
+        values = self.stated.evaluate(x, return_values_of=["F", "G", "H"], return_as_dictionary=True)
+        out["F"], out["G"] = values["F"], np.hstack([values["G"], np.abs(values["H"]) - 1e-4])
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize("stated", [lambda problem: problem, Banded], ids=["equalities", "absolute values"])
 @pytest.mark.parametrize(("name", "optimum", "near"), [("g5", 5126.4967, 1e-4), ("g13", 0.0539415, 1e-2), ("g15", 961.7150222899, 1e-5)])
-def test_published_optima_with_equalities_are_found(name, optimum, near):
-    """Two or three nonlinear equalities, to 1e-6. Optima: Liang and others, Problem definitions for the CEC 2006 special session on
-    constrained real-parameter optimization, 2006, where equalities hold to 1e-4."""
-    front = MACS().minimize(get_problem(name), evaluations=10_000, seed=1, progress=False)
+def test_published_optima_with_equalities_are_found(name, optimum, near, stated):
+    """Two or three nonlinear equalities, to 1e-6, or as limits on absolute values. Optima: Liang and others, Problem definitions for the
+    CEC 2006 special session on constrained real-parameter optimization, 2006, where equalities hold to 1e-4."""
+    front = MACS().minimize(stated(get_problem(name)), evaluations=10_000, seed=1, progress=False)
     assert front.F[0, 0] == pytest.approx(optimum, rel=near)
 
 
