@@ -24,8 +24,8 @@ POOR, CLEARLY = 1e-4, 0.03
 """A constraint may be a limit on an absolute value where the misfit of its model is more than this part of the squared changes, and counts
 as one where this lowers the misfit to this part."""
 FOLDS, GUESSES = 5, 300
-"""Models of such a constraint, with each of which the signs of its residuals are chosen anew; and how many of the first models go on, of all
-such constraints together, but at least three of each."""
+"""Models of such a constraint, with each of which the signs of its residuals are chosen anew; and how many of the first models go on, of
+all such constraints together, but at least three of each."""
 BEYOND = 0.02
 """Part of the residuals by which a step goes beyond the zero of their models, so that it ends inside of limits."""
 
