@@ -100,11 +100,14 @@ def _gradients(steps: np.ndarray, residuals: np.ndarray, amount: np.ndarray, apa
     """
     fit = _Fit(steps[:count], apart[:count])
     slopes = fit(residuals[:count] - amount)[0]
-    whole = _Fit(steps, apart)
-    misfit, total = whole(residuals - amount)[1], np.square((residuals - amount) / apart[:, None]).sum(axis=0)
-    maybe = np.flatnonzero((residuals >= 0.0).all(axis=0) & (amount > 0.0) & (misfit > POOR * total))
+    maybe = np.flatnonzero((residuals >= 0.0).all(axis=0) & (amount > 0.0))
     if maybe.size:
-        signs = _signs(whole, steps, residuals[:, maybe], amount[maybe], CLEARLY * misfit[maybe])
+        whole, change = _Fit(steps, apart), residuals[:, maybe] - amount[maybe]
+        misfit = whole(change)[1]
+        poor = misfit > POOR * np.square(change / apart[:, None]).sum(axis=0)
+        maybe, misfit = maybe[poor], misfit[poor]
+    if maybe.size:
+        signs = _signs(whole, steps, residuals[:, maybe], amount[maybe], CLEARLY * misfit)
         folded = np.flatnonzero((signs < 0.0).any(axis=0))
         which = maybe[folded]
         slopes[:, which] = fit((signs[:, folded] * residuals[:, which])[:count] - amount[which])[0]

@@ -27,17 +27,17 @@ class FromPoints:
     def __init__(self, nlp: NLP, parts: Parts) -> None:
         self.z = ca.MX.sym("z", len(nlp.variables))
         self._frame = frame = _framed(parts, self.z)
-        self._inputs, self._shared, A = list[tuple[ca.MX, ca.MX]](), list[tuple[ca.MX, _Common]](), ca.MX(frame.A)
+        self._inputs, self._shared = list[tuple[ca.MX, ca.MX]](), list[tuple[ca.MX, _Common]]()
+        self._A: ca.DM | ca.MX = frame.A
         for one, common, y in zip(frame.points, frame.common, parts.inputs.call([self.z]), strict=True):
             v = y[one.vary, :]
             if common is not None:
                 p = y[common.of, 0]
                 u, slopes = common.slopes(p)
                 v = ca.vertcat(v, ca.repmat(u, 1, y.shape[1]))
-                A += _product(common.to, _product(slopes, common.A))
+                self._A = self._A + _product(common.to, _product(slopes, common.A))
                 self._shared.append((p, common))
             self._inputs.append((v, y[one.fixed, :]))
-        self._A = A if self._shared else frame.A
         found = [one.slopes.map(v.shape[1])(v, rest) for one, (v, rest) in zip(frame.points, self._inputs, strict=True)]
         self.rows, self.q = parts.affine.call([self.z, *(w for w, _ in found)])
         self._slopes = ca.MX(frame.slopes, ca.veccat(*(slopes for _, slopes in found)))
