@@ -239,12 +239,14 @@ def scalarize(
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds), scaling)
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
+        left = max_iterations - sum(solved.iterations for solved in found)
         share = max_iterations if not (found or persistent) else max(min(LEAST, max_iterations), int(strategy.share * max_iterations))
-        if sum(solved.iterations for solved in found) + share > max_iterations:
+        if left < min(LEAST, share):
             break
-        # What is feasible and ran out of iterations goes on, scaled anew.
-        going = [solved.z for solved in found if solved.message == AT_LIMIT and not feasible and _rank(task, solved, tolerance)[0] == 0.0]
-        found.append(_unstuck(nlp, task, going[-1] if going else start, replace(settings, max_iterations=share), strategy))
+        # What is feasible and ran out of iterations, or of its box, goes on, scaled anew.
+        unended = (IN_BOX,) if feasible else (IN_BOX, AT_LIMIT)
+        going = [solved.z for solved in found if solved.message in unended and _rank(task, solved, tolerance)[0] == 0.0]
+        found.append(_unstuck(nlp, task, going[-1] if going else start, replace(settings, max_iterations=min(share, left)), strategy))
         worse = feasible and task.value(found[-1].F) > tolerance
         if found[-1].clocked or (found[-1].status == CONVERGED and not worse):
             break
