@@ -66,10 +66,8 @@ COMMON: Options = (
     ("mumps_permuting_scaling", 0),
     ("mumps_pivot_order", 0),
 )
-"""Options of all strategies: what is scaled already needs neither scaling nor refinement."""
-SCALED, UNCHANGED = 77, 0
-"""Scaling of matrices by MUMPS, which takes a little of each iteration. Where limits of objectives leave nothing strictly inside, and
-from starts that are drawn, iterations with matrices that are not scaled may take many times as long: some 30 times on the skip entry."""
+"""Options of all strategies: what is scaled already needs neither scaling nor refinement. Matrices are scaled by MUMPS all the same, which
+takes some per cent of an iteration: where nothing is strictly inside, iterations without take more than ten times as long."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -130,12 +128,11 @@ class Solved:
 
 @dataclass(frozen=True)
 class _Settings:
-    """The settings of a program; `scaling` is that of matrices, see `SCALED`."""
+    """The settings of a program."""
 
     tolerance: float
     max_iterations: int
     seconds: float
-    scaling: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,11 +150,6 @@ class _Task:
     top: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-
-    @property
-    def limited(self) -> bool:
-        """Whether objectives have hard limits."""
-        return bool(np.isfinite(self.top).any() or (self.used & (self.slope == 0)).any())
 
     def value(self, F: np.ndarray) -> float:
         """The least a that F (m,) allows."""
@@ -235,8 +227,7 @@ def scalarize(
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
-    scaling = SCALED if task.limited or not (persistent or feasible or near) else UNCHANGED
-    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), scaling)
+    settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
         left = max_iterations - sum(solved.iterations for solved in found)
@@ -333,7 +324,7 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    options = (*COMMON, ("mumps_scaling", settings.scaling), ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
+    options = (*COMMON, ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
         columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
         run = solver(nlp, settings.seconds, settings.max_iterations, options)

@@ -67,7 +67,7 @@ def test_an_end_is_also_sought_from_those_of_the_others():
 
 @pytest.mark.parametrize("power", [2, 4])
 def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch, power):
-    """Of p^power and -p, the first has one optimum: with a slack s of the range of 1, the second gains s^(1 / power), and loses it again."""
+    """Of p^power and -p, the first has one optimum: with a slack s of a range of 1, the second gains s^(1 / power), for the slack alone."""
     monkeypatch.setattr(lexicographic, "SOON", 1)
     problem = Problem("vertical")
     run = problem.phase("run", t0=0.0, tf=1.0)
@@ -77,7 +77,7 @@ def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch
     problem.minimize("level", -p + 0.0 * run.final(x))
     solver = MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
     (one, place), (other, _) = optimum_from(solver, 0, 0.0), optimum_from(solver, 1, 0.9)
-    assert one.F == pytest.approx([0, 0], abs=1e-6) and other.F == pytest.approx([1, -1], abs=1e-6)
+    assert np.abs(one.F).max() < 1e-6 and np.abs(other.F - [1, -1]).max() < 1e-6
     slack = np.array([1e-5, 0.0])
     near = solver.near(one.z, np.array([np.inf, 0.0]), np.array([0.0, 1.0]), np.array([1e-5, np.inf]))
     assert near.F[1] == pytest.approx(-(1e-5 ** (1 / power)), rel=0.01)
