@@ -66,8 +66,11 @@ COMMON: Options = (
     ("mumps_permuting_scaling", 0),
     ("mumps_pivot_order", 0),
 )
-"""Options of all strategies: what is scaled already needs neither scaling nor refinement. Matrices are scaled by MUMPS all the same, which
-takes some per cent of an iteration: where nothing is strictly inside, iterations without take more than ten times as long."""
+"""Options of all strategies: what is scaled already needs neither scaling nor refinement."""
+SCALED, UNCHANGED = 77, 0
+"""Scaling of matrices by MUMPS, which takes some per cent of an iteration. Where limits of objectives leave nothing strictly inside, from
+feasible starts, and from those that are drawn, iterations with matrices that are not scaled may take many times as long: some 30 times on
+the skip entry."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -128,11 +131,12 @@ class Solved:
 
 @dataclass(frozen=True)
 class _Settings:
-    """The settings of a program."""
+    """The settings of a program; `scaling` is that of matrices, see `SCALED`."""
 
     tolerance: float
     max_iterations: int
     seconds: float
+    scaling: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +154,11 @@ class _Task:
     top: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
+
+    @property
+    def limited(self) -> bool:
+        """Whether objectives have hard limits."""
+        return bool(np.isfinite(self.top).any() or (self.used & (self.slope == 0)).any())
 
     def value(self, F: np.ndarray) -> float:
         """The least a that F (m,) allows."""
@@ -227,7 +236,8 @@ def scalarize(
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
-    settings = _Settings(float(tolerance), int(max_iterations), float(seconds))
+    scaling = SCALED if task.limited or feasible or not (persistent or near) else UNCHANGED
+    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), scaling)
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
         left = max_iterations - sum(solved.iterations for solved in found)
@@ -324,7 +334,7 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    options = (*COMMON, ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
+    options = (*COMMON, ("mumps_scaling", settings.scaling), ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
         columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
         run = solver(nlp, settings.seconds, settings.max_iterations, options)
