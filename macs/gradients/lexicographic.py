@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -140,8 +141,10 @@ def _tied_with_slack(
         if near.status != CONVERGED or gain <= max(slack[j], (1 + UNSURE) * _worth(near, j, np.where(freer < np.inf, slack, 0.0))):
             return best, ceiling
         exact = solver.near(near.z, *alone, ceiling)
-    if exact.status == CONVERGED and exact.F[j] < best.F[j]:
-        return exact, ceiling
+    within = exact.violation <= solver.tolerance and (ceiling + LIMIT / SLACK * slack >= exact.F).all()
+    if exact.status == CONVERGED or (within and exact.F[j] - near.F[j] <= large):
+        # However its solve ended, it has the least values of the objectives before.
+        return (replace(exact, status=CONVERGED), ceiling) if exact.F[j] < best.F[j] else (best, ceiling)
     return (near, freer) if gain > large else (best, ceiling)
 
 
