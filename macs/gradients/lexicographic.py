@@ -24,6 +24,10 @@ SLACK, SOON, TIES = 1e-5, 50, 150
 iterations of a solve that is to improve the others without a loss, and of one with it."""
 
 
+SMALL = 600
+"""Most variables of a program whose iterations take so little that `TIES` are spent without slack, too, and more where they gain."""
+
+
 UNSURE = 0.2
 """Part of what a slack is worth, as its multipliers say, that is not known: a gain that exceeds it by more was not all for the slack."""
 
@@ -113,9 +117,15 @@ def _tied(
     Often there is but one such point; nothing is then strictly inside, and a solve would take long to find nothing.
     """
     alone, large = single_task(j, len(spans)), LOOSE * abs(best.F[j] - optimum.F[j])
-    with solver.solves.at_most(SOON):
+    small = len(best.z) <= SMALL
+    with solver.solves.at_most(TIES if small else SOON):
         # No slack: where the front is steep, a small loss in one objective changes another by its square root.
         solved = solver.solve(*alone, ceiling, best.z)
+        for _ in range(ROUNDS if small else 0):
+            if solved.status == CONVERGED or not best.F[j] - solved.F[j] > large:
+                break
+            # Much was gained before the iterations ran out.
+            solved = solver.solve(*alone, ceiling, solved.z)
     if solved.status != CONVERGED:
         solved, ceiling = _tied_with_slack(solver, j, best, ceiling, SLACK * spans, large)
     if optimum.status == CONVERGED and best.F[j] - solved.F[j] > large:

@@ -32,10 +32,11 @@ def optimum_from(solver: MultistartSolver, i: int, p: float):
     return solver.from_vector(start, np.where(np.arange(2) == i, 0.0, np.inf), np.eye(2)[i]), place
 
 
-@pytest.mark.parametrize("soon", [1, lexicographic.SOON])
+@pytest.mark.parametrize(("small", "soon"), [(lexicographic.SMALL, lexicographic.SOON), (0, lexicographic.SOON), (0, 1)])
 @pytest.mark.parametrize("other", [GOOD, POOR])
-def test_an_end_lies_in_the_best_valley_that_is_known(monkeypatch, other, soon):
-    """Also where no solve without slack ends soon."""
+def test_an_end_lies_in_the_best_valley_that_is_known(monkeypatch, other, small, soon):
+    """Also where a program is not small, and where no solve without slack ends soon."""
+    monkeypatch.setattr(lexicographic, "SMALL", small)
     monkeypatch.setattr(lexicographic, "SOON", soon)
     solver = solver_of_two_valleys()
     (first, place), (second, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, other)
@@ -68,6 +69,7 @@ def test_an_end_is_also_sought_from_those_of_the_others():
 @pytest.mark.parametrize("power", [2, 4])
 def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch, power):
     """Of p^power and -p, the first has one optimum: with a slack s of a range of 1, the second gains s^(1 / power), for the slack alone."""
+    monkeypatch.setattr(lexicographic, "SMALL", 0)
     monkeypatch.setattr(lexicographic, "SOON", 1)
     problem = Problem("vertical")
     run = problem.phase("run", t0=0.0, tf=1.0)
