@@ -69,8 +69,8 @@ COMMON: Options = (
 """Options of all strategies: what is scaled already needs neither scaling nor refinement."""
 SCALED, UNCHANGED = 77, 0
 """Scaling of matrices by MUMPS, which takes some per cent of an iteration. Where limits of objectives leave nothing strictly inside, from
-feasible starts, and from those that are drawn, iterations with matrices that are not scaled may take many times as long: some 30 times on
-the skip entry."""
+feasible starts for several objectives, and from starts that are drawn, iterations with matrices that are not scaled may take many times as
+long: some 30 times on the skip entry."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -236,7 +236,8 @@ def scalarize(
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
-    scaling = SCALED if task.limited or feasible or not (persistent or near) else UNCHANGED
+    drawn, several = not (persistent or feasible or near), np.count_nonzero(task.used) > 1
+    scaling = SCALED if task.limited or drawn or (feasible and several) else UNCHANGED
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds), scaling)
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
