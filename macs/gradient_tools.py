@@ -35,6 +35,7 @@ from .fronts.points import Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.along import ROUNDS, along
+from .gradients.lexicographic import lexicographic_ends
 from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver, single_task
 from .gradients.starts import Census
 from .gradients.targets import METHODS, check_points, targets
@@ -380,7 +381,7 @@ class _Job:
 
     def ends(self) -> list[Solved]:
         """The lexicographic optimum of each objective."""
-        return self.solver.ends()
+        return lexicographic_ends(self.solver)
 
     def ranges(self, ends: Sequence[Solved]) -> np.ndarray:
         """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import numpy as np
 from transcription.base import INFEASIBLE, NLP
 from transcription.nlp.elastic import least_violation
 from transcription.nlp.scalarized import Solved, scalarize
-from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED, Counts
@@ -20,20 +18,6 @@ from .starts import UNSEEN, Census, Starts
 
 LIMIT, BETTER = 1e-8, 1e-7
 """Fraction of an objective's range by which its limit may be exceeded; difference in alpha by which a result is clearly better."""
-
-
-LOOSE = 1e-2
-"""Part of an objective's range that is more than the tolerance of those before it explains: if it falls by more while these keep their
-least values, it was not determined by them, and a point where it is lower by more lies in another valley."""
-
-
-SLACK, TIES = 1e-5, 150
-"""Where the others cannot be improved without any loss in an objective, how much of it may be lost, in its range between the ends; most
-iterations of a solve that is to improve the others."""
-
-
-ROUNDS, MORE = 5, 1e-6
-"""Most rounds in which optima are sought from each other; what counts as a gain then, in scales."""
 
 
 MOST_ITERATIONS = 500
@@ -249,102 +233,10 @@ class MultistartSolver:
             solved = self.better([solved, self.from_vector(start, *task)], *task)
         return solved
 
-    def ends(self, singles: Sequence[Solved] = ()) -> list[Solved]:
-        """The lexicographic optimum of each objective: its least value, then those of the others in their order, each without a loss in
-        those before, or, where no solve achieves that, with a loss of `SLACK`. It begins at the `singles`, the optima of each objective
-        alone, in their order; those that are not given are found first. Each is also sought from the ends of the others: they are found in
-        different valleys."""
-        m = len(self.nlp.problem.goals)
-        optima, tried = list(singles), dict[tuple[int, int], np.ndarray]()
-        while (i := len(optima)) < m:
-            begun = self.nearest(*single_task(i, m))
-            optima.append(self.single(i))
-            tried |= {(i, k): optima[k].F for k in range(i) if begun is not None and np.array_equal(begun, optima[k].z)}
-        ends: list[Solved | None] = [None] * m
-        for _ in range(ROUNDS):
-            self._from_each_other(optima, tried)
-            for i in range(m):
-                if optima[i] is not ends[i]:
-                    ends[i] = self._lexicographic(i, optima)
-            if all(one is end for one, end in zip(optima, ends, strict=True)):
-                break
-            optima = [end for end in ends if end is not None]
-        return optima
-
-    def _from_each_other(self, optima: list[Solved], tried: dict[tuple[int, int], np.ndarray]) -> None:
-        """Replace optima of single objectives by better ones that short solves from those of the others find, until there are none.
-
-        `tried` has the objectives of the optimum k from which objective i was sought before, by (i, k); a solve from another one like it is
-        not worth its time.
-        """
-        m, scales = len(optima), nlp_scales(self.nlp)
-        for _ in range(ROUNDS):
-            improved = False
-            for i, k in permutations(range(m), 2):
-                if optima[k].status != CONVERGED:
-                    continue
-                spans = _spans(optima)
-                if (i, k) in tried and (np.abs(optima[k].F - tried[i, k]) <= LOOSE * spans).all():
-                    continue
-                tried[i, k] = optima[k].F
-                with self.solves.at_most(TIES):
-                    found = self.from_vector(optima[k].z, *single_task(i, m))
-                # What an end has lost to the others is none.
-                gain = max(MORE * scales[i], 2 * SLACK * spans[i])
-                if found.status == CONVERGED and (optima[i].status != CONVERGED or optima[i].F[i] - found.F[i] > gain):
-                    optima[i], improved = found, True
-            if not improved:
-                break
-
-    def _lexicographic(self, i: int, optima: Sequence[Solved]) -> Solved:
-        """The end of objective i; see `ends`."""
-        best, m = optima[i], len(optima)
-        if best.status != CONVERGED:
-            return best
-        ceiling, least, spans = np.full(m, np.inf), best.F[i], _spans(optima)
-        for j in (k for k in range(m) if k != i):
-            ceiling[i] = best.F[i]
-            best, ceiling = self._tied(j, best, ceiling, spans, optima[j])
-            ceiling[j] = best.F[j]
-        # A range may be no more than rounding, where objectives are in no conflict: no solve can tell such a loss.
-        if best.F[i] - least > LIMIT * max(spans[i], nlp_scales(self.nlp)[i]):
-            # What was lost for the others is worth a little of what they gained.
-            near = np.where(np.arange(m) == i, np.inf, best.F + SLACK * spans)
-            with self.solves.at_most(TIES):
-                again = self.from_vector(best.z, *single_task(i, m), near)
-            best = again if again.status == CONVERGED and again.F[i] < best.F[i] else best
-        return best
-
-    def _tied(self, j: int, best: Solved, ceiling: np.ndarray, spans: np.ndarray, optimum: Solved) -> tuple[Solved, np.ndarray]:
-        """The least value of objective j, with that of `optimum`, among the points within a ceiling (m,), which `best` attains; and the
-        ceiling, with `SLACK` where it was needed.
-
-        Often there is but one such point; nothing is then strictly inside, and a solve would take long to find nothing.
-        """
-        alone = single_task(j, len(spans))
-        large = LOOSE * abs(best.F[j] - optimum.F[j])
-        with self.solves.at_most(TIES):
-            # No slack: where the front is steep, a small loss in one objective changes another by its square root.
-            solved = self.solve(*alone, ceiling, best.z)
-            for _ in range(ROUNDS):
-                if solved.status == CONVERGED or not best.F[j] - solved.F[j] > large:
-                    break
-                # Much was gained before the iterations ran out.
-                solved = self.solve(*alone, ceiling, solved.z)
-            if solved.status != CONVERGED:
-                # Perhaps much can be gained near by; if not, what is known stays.
-                freer = ceiling + SLACK * spans
-                near, solved = self.from_vector(best.z, *alone, freer), best
-                if near.status == CONVERGED and best.F[j] - near.F[j] > large:
-                    exact = self.from_vector(near.z, *alone, ceiling)
-                    solved, ceiling = (exact, ceiling) if exact.status == CONVERGED else (near, freer)
-            if optimum.status == CONVERGED and best.F[j] - solved.F[j] > large:
-                # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
-                # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.
-                other = self.from_vector(optimum.z, *alone, ceiling)
-                if other.status == CONVERGED and solved.F[j] - other.F[j] > large:
-                    solved = other
-        return solved, ceiling
+    def near(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
+        """The result of one solve that stays near a vector (n,)."""
+        with self.solves.nearby():
+            return self.from_vector(start, reference, weights, ceiling)
 
     def merits(self, reference: np.ndarray, weights: np.ndarray, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
         """Merits (k,) of points F (k, m) for a scalarised problem, less is better: their alpha plus their excess over limits and
@@ -381,8 +273,7 @@ class MultistartSolver:
         """The better of a result and a solve from a known vector (n,) that is better; where that goes elsewhere, one that stays near it."""
         found = self.better([solved, self.from_vector(rival, reference, weights)], reference, weights)
         if self.rival(found, reference, weights) is not None:
-            with self.solves.nearby():
-                found = self.better([found, self.from_vector(rival, reference, weights)], reference, weights)
+            found = self.better([found, self.near(rival, reference, weights)], reference, weights)
         return found
 
     def clearly_better(self, one: Solved, other: Solved, reference: np.ndarray, weights: np.ndarray) -> bool:
@@ -410,11 +301,6 @@ class MultistartSolver:
 def single_task(i: int, m: int) -> tuple[np.ndarray, np.ndarray]:
     """Reference and weights (m,) of objective i alone; see `scalarize`."""
     return np.where(np.arange(m) == i, 0.0, np.inf), np.eye(m)[i]
-
-
-def _spans(optima: Sequence[Solved]) -> np.ndarray:
-    """Ranges (m,) of the objectives between the optima that were found, at least one."""
-    return np.ptp([one.F for one in optima if one.status == CONVERGED], axis=0)
 
 
 def guessed_start(nlp: NLP) -> np.ndarray | None:

@@ -20,6 +20,7 @@ from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import certified, vectors_points
 from ..fronts.points import Points
 from ..fronts.verified import verified
+from ..gradients.lexicographic import lexicographic_ends
 from ..gradients.multistart import GradientSolves, MultistartSolver, guessed_start
 from ..gradients.starts import Census
 from .mesh_loop import differentiable
@@ -106,7 +107,7 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     solves, rng = GradientSolves(tolerance), np.random.default_rng(0)
     solver = MultistartSolver(nlp, guessed_start(nlp), None, rng, solves)
     show("ends of the front on a coarse mesh")
-    solved = solver.ends()
+    solved = lexicographic_ends(solver)
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
     ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, **certified(nlp, Z, None))

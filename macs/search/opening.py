@@ -15,6 +15,7 @@ from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..gradients import starts
 from ..gradients.along import along
+from ..gradients.lexicographic import lexicographic_ends
 from ..gradients.multistart import SHORT, GradientSolves, MultistartSolver, guessed_start, single_task
 from ..gradients.starts import Starts
 from ..gradients.targets import METHODS, targets
@@ -131,7 +132,7 @@ class Opening:
     def _found(self, solver: MultistartSolver) -> Evaluation:
         """The ends of the front, and a compromise of them; where the search chooses its ways, points along the front instead, each from as
         many starts as pay. Fewer if asked to end early, or where none was found."""
-        found = solver.ends()
+        found = lexicographic_ends(solver)
         self.several = any(one.optima() > 1 for one in solver.census.values())
         for i, one in solver.census.items():
             self.alike[i] = one.enough and one.optima() == 1

@@ -68,8 +68,9 @@ COMMON: Options = (
 )
 """Options of all strategies: what is scaled already needs neither scaling nor refinement."""
 SCALED, UNCHANGED = 77, 0
-"""Scaling of matrices by MUMPS, which takes a little of each iteration. Where limits of objectives leave nothing strictly inside, and
-from starts that are drawn, iterations with matrices that are not scaled may take many times as long: some 30 times on the skip entry."""
+"""Scaling of matrices by MUMPS, which takes some per cent of an iteration. Where limits of objectives leave nothing strictly inside, from
+feasible starts for several objectives, and from starts that are drawn, iterations with matrices that are not scaled may take many times as
+long: some 30 times on the skip entry."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -235,16 +236,19 @@ def scalarize(
     F, violation = nlp.evaluate(start[None])
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
-    scaling = SCALED if task.limited or not (persistent or feasible or near) else UNCHANGED
+    drawn, several = not (persistent or feasible or near), np.count_nonzero(task.used) > 1
+    scaling = SCALED if task.limited or drawn or (feasible and several) else UNCHANGED
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds), scaling)
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
+        left = max_iterations - sum(solved.iterations for solved in found)
         share = max_iterations if not (found or persistent) else max(min(LEAST, max_iterations), int(strategy.share * max_iterations))
-        if sum(solved.iterations for solved in found) + share > max_iterations:
+        if left < min(LEAST, share):
             break
-        # What is feasible and ran out of iterations goes on, scaled anew.
-        going = [solved.z for solved in found if solved.message == AT_LIMIT and not feasible and _rank(task, solved, tolerance)[0] == 0.0]
-        found.append(_unstuck(nlp, task, going[-1] if going else start, replace(settings, max_iterations=share), strategy))
+        # What is feasible and ran out of iterations, or of its box, goes on, scaled anew.
+        unended = (IN_BOX,) if feasible else (IN_BOX, AT_LIMIT)
+        going = [solved.z for solved in found if solved.message in unended and _rank(task, solved, tolerance)[0] == 0.0]
+        found.append(_unstuck(nlp, task, going[-1] if going else start, replace(settings, max_iterations=min(share, left)), strategy))
         worse = feasible and task.value(found[-1].F) > tolerance
         if found[-1].clocked or (found[-1].status == CONVERGED and not worse):
             break

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from macs.gradients import lexicographic
+from macs.gradients.lexicographic import lexicographic_ends
 from macs.gradients.multistart import GradientSolves, MultistartSolver
 from problems import Problem
 from transcription import DFET
@@ -30,11 +32,15 @@ def optimum_from(solver: MultistartSolver, i: int, p: float):
     return solver.from_vector(start, np.where(np.arange(2) == i, 0.0, np.inf), np.eye(2)[i]), place
 
 
+@pytest.mark.parametrize(("small", "soon"), [(lexicographic.SMALL, lexicographic.SOON), (0, lexicographic.SOON), (0, 1)])
 @pytest.mark.parametrize("other", [GOOD, POOR])
-def test_an_end_lies_in_the_best_valley_that_is_known(other):
+def test_an_end_lies_in_the_best_valley_that_is_known(monkeypatch, other, small, soon):
+    """Also where a program is not small, and where no solve without slack ends soon."""
+    monkeypatch.setattr(lexicographic, "SMALL", small)
+    monkeypatch.setattr(lexicographic, "SOON", soon)
     solver = solver_of_two_valleys()
     (first, place), (second, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, other)
-    end = solver.ends([first, second])[0]
+    end = lexicographic_ends(solver, [first, second])[0]
     valley = min(np.roots([4, 0, -4, 0.2]).real, key=lambda p: abs(p - other))
     assert end.z[place] == pytest.approx(valley, abs=1e-5)
     assert end.F[0] <= first.F[0] + 1e-12 and end.F[1] == pytest.approx((valley**2 - 1) ** 2 + 0.2 * valley + 1.0, abs=1e-5)
@@ -42,7 +48,7 @@ def test_an_end_lies_in_the_best_valley_that_is_known(other):
 
 def test_optima_that_are_not_given_are_found():
     solver = solver_of_two_valleys()
-    ends = solver.ends()
+    ends = lexicographic_ends(solver)
     assert len(ends) == 2 and ends[0].F[0] < 1e-10 and ends[1].F[0] == pytest.approx(1.0, abs=1e-5)
 
 
@@ -56,5 +62,42 @@ def test_an_end_is_also_sought_from_those_of_the_others():
     solver = MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
     (poor, place), (other, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, GOOD)
     assert poor.z[place] > 0 > other.z[place], "the one that was found is in the poor valley"
-    end = solver.ends([poor, other])[0]
+    end = lexicographic_ends(solver, [poor, other])[0]
     assert end.z[place] == pytest.approx(np.roots([4, 0, -4, 0.2]).real.min(), abs=1e-5) and end.F[0] < poor.F[0] - 0.3
+
+
+@pytest.mark.parametrize("power", [2, 4])
+def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch, power):
+    """Of p^power and -p, the first has one optimum: with a slack s of a range of 1, the second gains s^(1 / power), for the slack alone."""
+    monkeypatch.setattr(lexicographic, "SMALL", 0)
+    monkeypatch.setattr(lexicographic, "SOON", 1)
+    problem = Problem("vertical")
+    run = problem.phase("run", t0=0.0, tf=1.0)
+    x, p = run.state("x", bounds=(-2, 2), initial=0), problem.parameter("p", bounds=(-1, 1))
+    run.dynamics(x=run.control("u", bounds=(-1, 1)))
+    problem.minimize("steep", p**power + run.final(x) ** 2)
+    problem.minimize("level", -p + 0.0 * run.final(x))
+    solver = MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
+    (one, place), (other, _) = optimum_from(solver, 0, 0.0), optimum_from(solver, 1, 0.9)
+    assert np.abs(one.F).max() < 1e-6 and np.abs(other.F - [1, -1]).max() < 1e-6
+    slack = np.array([1e-5, 0.0])
+    near = solver.near(one.z, np.array([np.inf, 0.0]), np.array([0.0, 1.0]), np.array([1e-5, np.inf]))
+    assert near.F[1] == pytest.approx(-(1e-5 ** (1 / power)), rel=0.01)
+    assert lexicographic._worth(near, 1, slack) == pytest.approx(2 / power * 1e-5 ** (1 / power), rel=0.01)
+    before = solver.counts.gradient_solves
+    end, _ = lexicographic._tied(solver, 1, one, np.array([one.F[0], np.inf]), np.ones(2), other)
+    assert end.F[0] <= one.F[0] + 1e-8 and abs(end.z[place]) < 1e-2
+    assert power == 4 or (end is one and solver.counts.gradient_solves == before + 2)
+
+
+def test_a_solve_whose_iterations_ran_out_goes_on_where_much_was_gained():
+    solver = solver_of_two_valleys()
+    start = solver.nlp.first_guess(np.zeros((1, len(solver.nlp.free))))[0]
+    task = np.array([np.inf, 0.0]), np.array([0.0, 1.0])
+    with solver.solves.at_most(3):
+        short = solver.from_vector(start, *task)
+    assert short.status == "failed" and short.iterations == 3
+    assert lexicographic._gone_on(solver, short, short.F[1] - 1e-3, *task) is short
+    on = lexicographic._gone_on(solver, short, short.F[1] + 1e-3, *task)
+    assert on.status == "converged" and on.F[1] < short.F[1]
+    assert lexicographic._gone_on(solver, on, np.inf, *task) is on
