@@ -47,21 +47,23 @@ SETTINGS = tuple(one.name for one in fields(Search))
 """Names of the settings of MACS."""
 OPTIONS = tuple(name for name, one in inspect.signature(Algorithm).parameters.items() if one.kind is not one.VAR_KEYWORD)
 """Names of what every algorithm of pymoo takes."""
+POINTS = 100
+"""Largest number of points in the result by default: as many as the populations of pymoo's algorithms have."""
 
 
 class MACS(Algorithm):
     """Multi-Agent Collaborative Search as an algorithm of pymoo, for any pymoo Problem of real variables.
 
-    It is the search of `macs.MACS`: on a problem without constraints, the same seed and number of evaluations give the points of
+    It is the search of `macs.MACS`: on a problem without constraints, the same settings, seed and number of evaluations give the points of
     `macs.MACS(...).minimize(problem, evaluations=..., seed=...)`, to the last bit; with G, those of its `tolerance` near 0.
 
     Parameters
     ----------
     agents : int, default 10
         Number of agents, at least 3.
-    archive : int, default 10
-        Largest number of points in the result, at least the number of objectives. (An archive of pymoo's own, which collects what was
-        evaluated, is an argument of `minimize`: `minimize(problem, MACS(), archive=MultiObjectiveArchive())`.)
+    archive : int, default 100
+        Largest number of points in the result, at least the number of objectives; `macs.MACS` has 10 by default. (An archive of pymoo's
+        own, which collects what was evaluated, is an argument of `minimize`: `minimize(problem, MACS(), archive=MultiObjectiveArchive())`.)
     rho, F, CR, ..., exponent, prefer
         All other settings of `macs.MACS`, with its defaults and errors: see `help(macs.MACS)`. Those for derivatives and meshes do nothing
         here, as on any plain function, but `mesh="adaptive"` and `polish_on` are refused as soon as the problem is known. `ceiling` does
@@ -137,7 +139,7 @@ class MACS(Algorithm):
         for name in settings:
             if name not in SETTINGS:
                 raise TypeError(unknown("setting of MACS", name, dict.fromkeys(("sampling", *SETTINGS, *OPTIONS))))
-        search = Search(**settings)
+        search = Search(**({"archive": POINTS} | settings))
         super().__init__(output=output, **options)
         self.search = search
         self.sampling = np.array(sampling) if isinstance(sampling, list | tuple) else sampling

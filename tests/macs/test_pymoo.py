@@ -112,7 +112,7 @@ def finished(algorithm: MACS) -> np.ndarray:
 )
 def test_the_points_are_those_of_macs_to_the_last_bit(name, settings):
     problem = get_problem(name)
-    front = macs.MACS(**settings).minimize(problem, evaluations=1111, seed=5, tolerance=STRICT)
+    front = macs.MACS(**({"archive": 100} | settings)).minimize(problem, evaluations=1111, seed=5, tolerance=STRICT)
     res = minimize(problem, MACS(**settings), ("n_eval", 1111), seed=5)
     assert res.algorithm.evaluator.n_eval == 1111 == front.stats["evaluations"]
     assert len(front) and np.array_equal(ordered(res.X, res.F), of(front))
@@ -128,11 +128,16 @@ def test_the_paper_is_the_same_too():
 @pytest.mark.slow
 def test_a_preference_guides_as_it_does_macs():
     wish = ReferencePoint({"f1": 0.2, "f2": 0.6})
-    front = macs.MACS(prefer=wish).minimize(get_problem("zdt1"), evaluations=900, seed=1)
-    res = minimize(get_problem("zdt1"), MACS(prefer=wish), ("n_eval", 900), seed=1)
+    front = macs.MACS(archive=20, prefer=wish).minimize(get_problem("zdt1"), evaluations=900, seed=1)
+    res = minimize(get_problem("zdt1"), MACS(archive=20, prefer=wish), ("n_eval", 900), seed=1)
     assert np.array_equal(ordered(res.F), ordered(front.objectives))
     with pytest.raises(ValueError, match="MACS: prefer"):
         minimize(get_problem("zdt1"), MACS(prefer=ReferencePoint({"mass": 0.2})), ("n_eval", 100))
+
+
+def test_by_default_there_are_as_many_points_as_in_a_population_of_pymoo():
+    assert len(minimize(get_problem("bnh"), MACS(), ("n_eval", 1_500), seed=1).F) == 100 == NSGA2().pop_size
+    assert MACS.paper().search.archive == macs.MACS.paper().archive
 
 
 def test_without_a_budget_it_is_the_search_without_one():
@@ -233,7 +238,7 @@ def test_other_terminations_end_a_run():
 
 def test_a_run_that_finds_nothing_to_evaluate_ends(monkeypatch):
     monkeypatch.setattr("macs.search.macs.MACS.advance", lambda self, state, evaluator, budget: None)
-    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 500), seed=1)
+    res = minimize(get_problem("zdt1"), MACS(archive=10), ("n_eval", 500), seed=1)
     assert res.algorithm.evaluator.n_eval == 10 and res.algorithm.n_gen == 102
     asked = ready(get_problem("zdt1"))
     batches = [len(asked.tell(infills=asked.evaluator.eval(asked.problem, asked.ask()))) for _ in range(3)]
@@ -269,7 +274,7 @@ def test_callbacks_see_each_iteration_and_may_end_the_run():
             if spent > 400:
                 algorithm.termination.terminate()
 
-    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 5000), callback=Watch(), seed=1)
+    res = minimize(get_problem("zdt1"), MACS(archive=10), ("n_eval", 5000), callback=Watch(), seed=1)
     generations, spent, off, best, points = zip(*res.algorithm.callback.data["seen"], strict=True)
     assert generations == tuple(range(1, len(spent) + 1)) and np.array_equal(np.cumsum(off), spent)
     assert spent[-2] > 400 and spent[-3] <= 400 and (np.diff(best) <= 0).all() and points[-1] == 10
@@ -277,7 +282,7 @@ def test_callbacks_see_each_iteration_and_may_end_the_run():
 
 
 def test_results_have_populations():
-    res = minimize(get_problem("bnh"), MACS(), ("n_eval", 500), seed=1)
+    res = minimize(get_problem("bnh"), MACS(archive=10), ("n_eval", 500), seed=1)
     assert {id(one) for one in res.opt} <= {id(one) for one in res.pop} and 10 <= len(res.pop) <= 20
     assert all(one.evaluated == {"F", "G", "H"} for one in res.pop)
     X, F, G = res.opt.get("X", "F", "G")
@@ -428,7 +433,7 @@ def test_ask_and_tell_give_the_same_points(name):
 @pytest.mark.slow
 def test_values_may_be_computed_elsewhere():
     problem = Problem(n_var=2, n_obj=2, n_ieq_constr=1, xl=np.zeros(2), xu=np.ones(2))
-    algorithm = MACS().setup(problem, termination=NoTermination(), seed=1)
+    algorithm = MACS(archive=10).setup(problem, termination=NoTermination(), seed=1)
     for _ in range(150):
         infills = algorithm.ask()
         X = infills.get("X")
@@ -454,7 +459,7 @@ def test_told_individuals_may_have_moved():
 
 def test_what_is_told_has_to_be_what_was_asked_for():
     problem = get_problem("zdt1")
-    algorithm = ready(problem)
+    algorithm = ready(problem, archive=10)
     infills = algorithm.ask()
     with pytest.raises(ValueError, match="tell: individuals without values"):
         algorithm.tell(infills=infills)
@@ -473,13 +478,13 @@ def test_what_is_told_has_to_be_what_was_asked_for():
 def test_first_points_are_a_start():
     problem = get_problem("zdt1", n_var=4)
     X = np.random.default_rng(0).random((30, 4))
-    front = macs.MACS().minimize(problem, evaluations=300, seed=1, start=X)
+    front = macs.MACS(archive=15).minimize(problem, evaluations=300, seed=1, start=X)
     for sampling in (X, X.tolist(), Population.new(X=X)):
-        res = minimize(problem, MACS(sampling=sampling), ("n_eval", 300), seed=1)
+        res = minimize(problem, MACS(archive=15, sampling=sampling), ("n_eval", 300), seed=1)
         assert np.array_equal(ordered(res.X, res.F), of(front))
     beyond = np.vstack([X[:1], np.full((1, 4), 1 + 1e-9)])
     assert np.array_equal(ready(problem, sampling=beyond).ask().get("X")[:2], np.clip(beyond, 0, 1)) and beyond.max() > 1
-    few = minimize(problem, MACS(sampling=X[0]), ("n_gen", 1), seed=1)
+    few = minimize(problem, MACS(archive=10, sampling=X[0]), ("n_gen", 1), seed=1)
     assert few.algorithm.evaluator.n_eval == 10 and np.array_equal(few.algorithm.off[0].X, X[0])
 
 
@@ -487,11 +492,11 @@ def test_evaluated_points_are_not_evaluated_again():
     problem = get_problem("zdt1", n_var=4)
     X = np.random.default_rng(0).random((30, 4))
     known = Evaluator().eval(problem, Population.new(X=X))
-    res = minimize(problem, MACS(sampling=known), ("n_eval", 300), seed=1)
-    front = macs.MACS().minimize(problem, evaluations=330, seed=1, start=X)
+    res = minimize(problem, MACS(archive=15, sampling=known), ("n_eval", 300), seed=1)
+    front = macs.MACS(archive=15).minimize(problem, evaluations=330, seed=1, start=X)
     assert res.algorithm.evaluator.n_eval == 300
     assert np.array_equal(ordered(res.X, res.F), of(front))
-    res = minimize(problem, MACS(sampling=known), ("n_gen", 1), seed=1)
+    res = minimize(problem, MACS(archive=15, sampling=known), ("n_gen", 1), seed=1)
     assert res.algorithm.evaluator.n_eval == 0 and len(res.algorithm.off) == 30
     many = minimize(problem, MACS(sampling=np.random.default_rng(0).random((PLANNED + 5, 4))), ("n_gen", 1), seed=1)
     assert many.algorithm.evaluator.n_eval == PLANNED + 5
@@ -516,7 +521,7 @@ def test_wrong_first_points_are_refused(X, message):
 
 
 def test_failed_evaluations_stop_nothing():
-    res = minimize(Holes(), MACS(), ("n_eval", 800), seed=1, verbose=False)
+    res = minimize(Holes(), MACS(archive=10), ("n_eval", 800), seed=1, verbose=False)
     assert np.isfinite(res.F).all() and len(res.F) == 10 and ((np.abs(res.X - 1) >= 0.5) & (np.abs(res.X - 1) <= 1 + 1e-3)).all()
     front = macs.MACS().minimize(Holes(), evaluations=800, seed=1)
     assert np.array_equal(ordered(res.X, res.F), of(front))
@@ -536,7 +541,7 @@ def test_where_nothing_is_feasible_the_least_infeasible_point_is_returned_if_ask
     assert res.X is None and len(res.algorithm.opt) == 1
     res = minimize(Nowhere(), MACS(), ("n_eval", 1_000), seed=1, return_least_infeasible=True)
     assert res.X.shape == (1, 3) and np.abs(res.X).max() < 0.1 and 1 <= res.CV[0, 0] < 1.01
-    front = macs.MACS().minimize(Nowhere(), evaluations=1_000, seed=1)
+    front = macs.MACS(archive=100).minimize(Nowhere(), evaluations=1_000, seed=1)
     assert np.array_equal(res.X[0], front.closest.decision)
 
 
