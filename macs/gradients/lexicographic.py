@@ -147,15 +147,24 @@ def _tied_with_slack(
         near = solver.near(best.z, *alone, freer)
         if near.status != CONVERGED:
             near = _gone_on(solver, solver.from_vector(best.z, *alone, freer), best.F[j] - large, *alone, freer)
-        gain = best.F[j] - near.F[j]
-        if near.status != CONVERGED or gain <= max(slack[j], (1 + UNSURE) * _worth(near, j, np.where(freer < np.inf, slack, 0.0))):
+        if near.status != CONVERGED:
             return best, ceiling
+        gain, explained = best.F[j] - near.F[j], (1 + UNSURE) * _worth(near, j, np.where(freer < np.inf, slack, 0.0))
+        if gain <= max(slack[j], explained):
+            return best, ceiling
+        # However a solve without slack ends, it counts if it keeps the objectives before, and lacks only what the slack is worth.
+        enough = np.where(np.arange(len(slack)) == j, near.F[j] + max(large, explained), ceiling + LIMIT / SLACK * slack)
         exact = solver.near(near.z, *alone, ceiling)
-    within = exact.violation <= solver.tolerance and (ceiling + LIMIT / SLACK * slack >= exact.F).all()
-    if exact.status == CONVERGED or (within and exact.F[j] - near.F[j] <= large):
-        # However its solve ended, it has the least values of the objectives before.
+        if not _within(solver, exact, enough):
+            exact = _gone_on(solver, exact, best.F[j] - large, *alone, ceiling)
+    if exact.status == CONVERGED or _within(solver, exact, enough):
         return (replace(exact, status=CONVERGED), ceiling) if exact.F[j] < best.F[j] else (best, ceiling)
     return (near, freer) if gain > large else (best, ceiling)
+
+
+def _within(solver: MultistartSolver, solved: Solved, enough: np.ndarray) -> bool:
+    """Whether a result is feasible, and its objectives are at most as large as `enough` (m,)."""
+    return bool(solved.violation <= solver.tolerance and (enough >= solved.F).all())
 
 
 def _gone_on(

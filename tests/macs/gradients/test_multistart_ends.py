@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from macs import optimize, payoff
 from macs.gradients import lexicographic
 from macs.gradients.lexicographic import lexicographic_ends
 from macs.gradients.multistart import GradientSolves, MultistartSolver
@@ -101,3 +103,24 @@ def test_a_solve_whose_iterations_ran_out_goes_on_where_much_was_gained():
     on = lexicographic._gone_on(solver, short, short.F[1] + 1e-3, *task)
     assert on.status == "converged" and on.F[1] < short.F[1]
     assert lexicographic._gone_on(solver, on, np.inf, *task) is on
+
+
+@pytest.mark.slow
+def test_what_is_least_stays_so_where_a_slack_would_gain_more_than_its_multiplier_says():
+    """A quick drive around an obstacle, whose effort falls with less than the root of the time that is lost."""
+    problem = Problem("drive")
+    drive = problem.phase("drive", t0=0.0, tf=(1.0, 20.0))
+    x = drive.state("x", bounds=(-2, 12), initial=0, final=10)
+    y = drive.state("y", bounds=(-5, 5), initial=0, final=0)
+    v = drive.state("v", bounds=(0, 3), initial=0.5)
+    heading = drive.state("heading", bounds=(-3, 3), initial=0)
+    thrust, turn = drive.control("thrust", bounds=(-1, 1)), drive.control("turn", bounds=(-1, 1))
+    drive.dynamics(x=v * ca.cos(heading), y=v * ca.sin(heading), v=thrust, heading=turn)
+    drive.path("obstacle", (x - 5) ** 2 + (y - 0.3) ** 2, lower=4.0)
+    problem.minimize("time", drive.tf)
+    problem.minimize("effort", drive.integral(thrust**2 + turn**2))
+    mesh = DFET(40, 3)
+    quickest = optimize(problem, mesh, objective="time", starts=3, seed=1)
+    end = payoff(problem, mesh, starts=3, seed=1)[0]
+    assert end.objectives["time"] == pytest.approx(quickest.objectives["time"], abs=1e-7 * 15.4)
+    assert end.objectives["effort"] < quickest.objectives["effort"] - 0.1
