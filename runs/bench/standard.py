@@ -15,6 +15,7 @@ from problems import load
 from problems.cases.standard import SHARE, Published, cases, published
 from problems.catalogue import STANDARD
 
+from ..data.memory import peak_memory
 from ..execution.apart import CRASHED, LATE, lines_apart
 from .measured import Column, Row, Target, short, table, verdicts
 
@@ -49,8 +50,6 @@ def title(name: str, i: int) -> str:
 
 def solved(name: str, i: int) -> dict[str, float | str]:
     """What a user gets without any option, simulated; `seconds` are those from the statement to the solution."""
-    import resource  # not on every system
-
     record, began = published(name)[i], time.perf_counter()
     problem = load(STANDARD + name, **record.data)
     point = optimize(problem)
@@ -66,8 +65,7 @@ def solved(name: str, i: int) -> dict[str, float | str]:
         "starts": stats["gradient_solves"],
         "iterations": stats["inner_iterations"],
         "verified": float(bool(point.verified)),
-        # Kilobytes, but bytes on a Mac.
-        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10),
+        "memory": peak_memory(),
     }
 
 

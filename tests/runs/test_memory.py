@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from runs.cli import main
-from runs.data.memory import is_memory_error
+from runs.data.memory import is_memory_error, peak_memory
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,6 +33,15 @@ def test_want_of_memory_is_one_line(tmp_path, monkeypatch, capsys, error, words)
     assert main(["solve", "four_bar_truss", "--seed", "1"]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("macs solve: out of memory") and words in line and "coarser" in line and not list(tmp_path.iterdir())
+
+
+def test_the_peak_of_a_process_is_its_own():
+    """Not that of the process that started it, which is what `getrusage` says on Linux."""
+    code = "from runs.data.memory import peak_memory; print(peak_memory()); block = b'x' * (100 * 2**20); print(peak_memory())"
+    block = b"x" * (400 * 2**20)
+    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    before, after = map(float, answer.stdout.split())
+    assert peak_memory() > len(block) / 2**20 and before < 300 and 100 <= after - before < 110
 
 
 def test_other_errors_are_not_for_want_of_memory(tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ import time
 from collections.abc import Sequence
 from multiprocessing import get_context
 
+from ...data.memory import peak_memory
 from .series import SERIES, Series
 
 ENOUGH = 4.0
@@ -29,14 +30,14 @@ def main(arguments: Sequence[str]) -> None:
 
 def measure(series: Series, sizes: Sequence[int], repeats: int) -> None:
     """Print a line of JSON for each repetition: name, size, CPU seconds, and MB of the peak so far above the beginning."""
-    begin = peak()
+    begin = peak_memory()
     series.prepare(sizes[0])()  # whatever is made once is made
     spent = dict.fromkeys(sizes, 0.0)
     for _ in range(repeats):  # all sizes, then again: if the machine is slow for a while, all sizes suffer alike
         for size in sizes:
             if spent[size] < ENOUGH:
                 spent[size] += (once := seconds(series, size))
-                print(json.dumps([series.name, size, once, peak() - begin]), flush=True)
+                print(json.dumps([series.name, size, once, peak_memory() - begin]), flush=True)
 
 
 def seconds(series: Series, size: int) -> float:
@@ -45,14 +46,6 @@ def seconds(series: Series, size: int) -> float:
     began = time.process_time()
     work()
     return time.process_time() - began
-
-
-def peak() -> float:
-    """Peak memory of this process, MB."""
-    import resource  # not on every system
-
-    # Kilobytes, but bytes on a Mac.
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 if __name__ == "__main__":
