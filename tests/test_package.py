@@ -1,12 +1,17 @@
-"""What is installed: all data files of the packages. `make package` builds the wheel and tries it."""
+"""What is installed: all data files of the packages, and other packages that suit every Python we promise. `make package` builds the wheel
+and tries it."""
 
 from __future__ import annotations
 
 import tomllib
 from fnmatch import fnmatch
+from importlib.metadata import distributions
 from pathlib import Path
 
 from package import FLOORS, LEFT_OUT, missing
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
 
@@ -32,3 +37,11 @@ def test_what_a_wheel_lacks_is_named():
     source = ["tests/test_front.py", "macs/front.py", "problems/cases/front.csv", "runs/pictures/goddard.png", "README.md"]
     assert missing(source, ["macs/front.py"]) == ["problems/cases/front.csv"]
     assert missing(source, ["macs/front.py", "problems/cases/front.csv"]) == []
+
+
+def test_what_is_pinned_suits_the_least_python():
+    """A pin for a later Python than the README asks for ends `make run` on older ones, which this machine may not be."""
+    pins = [Requirement(line) for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines() if "==" in line]
+    needs = {canonicalize_name(one.metadata["Name"]): one.metadata["Requires-Python"] or "" for one in distributions()}
+    pinned = {canonicalize_name(one.name) for one in pins} & needs.keys()
+    assert len(pinned) > 50 and [name for name in sorted(pinned) if "3.11.0" not in SpecifierSet(needs[name])] == []
