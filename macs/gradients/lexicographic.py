@@ -71,7 +71,7 @@ def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict
     for _ in range(ROUNDS):
         improved = False
         for i, k in permutations(range(m), 2):
-            if optima[k].status != CONVERGED:
+            if optima[k].status != CONVERGED or solver.is_least(optima[i], single_task(i, m)[0]):
                 continue
             spans = _spans(optima)
             if (i, k) in tried and (np.abs(optima[k].F - tried[i, k]) <= LOOSE * spans).all():
@@ -96,7 +96,8 @@ def _lexicographic(solver: MultistartSolver, i: int, optima: Sequence[Solved]) -
     ceiling, least, spans = np.full(m, np.inf), best.F[i], _spans(optima)
     for j in (k for k in range(m) if k != i):
         ceiling[i] = best.F[i]
-        best, ceiling = _tied(solver, j, best, ceiling, spans, optima[j])
+        if not solver.is_least(best, single_task(j, m)[0]):
+            best, ceiling = _tied(solver, j, best, ceiling, spans, optima[j])
         ceiling[j] = best.F[j]
     # A range may be no more than rounding, where objectives are in no conflict: no solve can tell such a loss.
     if best.F[i] - least > LIMIT * max(spans[i], nlp_scales(solver.nlp)[i]):

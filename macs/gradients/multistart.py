@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from transcription.base import INFEASIBLE, NLP
+from transcription.nlp.derivatives import linear_objectives, objective_gradients
 from transcription.nlp.elastic import least_violation
 from transcription.nlp.scalarized import Solved, scalarize
+from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED, Counts
@@ -171,7 +173,9 @@ class MultistartSolver:
         best = self.reached(self.solve(reference, weights), reference, weights)
         limit = self.counts.work + max(LITTLE, self.counts.work - before)
         census.add(self.loss(best, reference, weights))
-        while not (census.enough or self.closest or self.drawn_enough or self.counts.work >= limit or stopping()):
+        while not (
+            census.enough or self.closest or self.drawn_enough or self.counts.work >= limit or stopping() or self.is_least(best, reference)
+        ):
             # Where none has converged yet, they may all take long.
             with self.solves.at_most(SHORT if census.converged else self.solves.max_iterations):
                 found = self.from_drawn(reference, weights, best=best if census.converged else None)
@@ -281,6 +285,10 @@ class MultistartSolver:
         alpha, known = self.loss(one, reference, weights), self.loss(other, reference, weights)
         return alpha is not None and (known is None or alpha < known - BETTER)
 
+    def is_least(self, solved: Solved, reference: np.ndarray) -> bool:
+        """Whether a result has the least of the only objective of a problem that bounds allow, see `scalarize` and `is_least`."""
+        return solved.status == CONVERGED and is_least(self.nlp, solved.z, reference)
+
     def nearest(self, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
         """The known vector (n,) with the best merit; None if none is known."""
         return self._known[np.argmin(self.merits(reference, weights, self._F, self._violation))] if len(self._known) else None
@@ -296,6 +304,18 @@ class MultistartSolver:
             if found[-1].status == CONVERGED or best is not None:
                 break
         return self.better(found, reference, weights)
+
+
+def is_least(nlp: NLP, z: np.ndarray, reference: np.ndarray) -> bool:
+    """Whether a vector (n,) has the least value that the bounds of variables allow an objective to have: where it is linear, and the only
+    one of the problem with this reference (m,). No other start can then lead to less."""
+    (used,) = np.nonzero(reference < np.inf)
+    if len(used) != 1:
+        return False
+    slopes = np.array(objective_gradients(nlp)(z)).reshape(-1, len(z))[used[0]]
+    room = np.where(nlp.period > 0, np.inf, np.where(slopes > 0, z - nlp.lower, nlp.upper - z))
+    to_fall = float(np.abs(slopes[slopes != 0.0]) @ room[slopes != 0.0])
+    return to_fall <= BETTER * nlp_scales(nlp)[used[0]] and bool(linear_objectives(nlp)[used[0]])
 
 
 def single_task(i: int, m: int) -> tuple[np.ndarray, np.ndarray]:

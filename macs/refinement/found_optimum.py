@@ -15,7 +15,7 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
-from ..gradients.multistart import SHORT, MultistartSolver
+from ..gradients.multistart import SHORT, MultistartSolver, is_least
 from ..gradients.starts import Census
 from ..gradients.tasks import Along
 from .mesh_loop import MeshLoop, Refinement
@@ -85,6 +85,10 @@ class Found:
         """Whether simulations agree with it as well as is wanted."""
         return self.refinement is not None and not self.refinement.complaints() and not self.behind
 
+    def is_least(self, reference: np.ndarray) -> bool:
+        """Whether bounds allow nothing better, see `multistart.is_least`."""
+        return self.status == CONVERGED and is_least(self.nlp, self.z, reference)
+
     @property
     def note(self) -> str:
         """Why it is not good, or what else is to be said of it."""
@@ -140,7 +144,7 @@ def found_optimum(
         if search.enough:
             break
     best = search.best
-    if starts is None and not (best.good and best.times == best.starts > 1):
+    if starts is None and not (best.good and (best.times == best.starts > 1 or best.is_least(reference))):
         search.elsewhere((SECOND,))
     return search.best
 
@@ -185,7 +189,7 @@ class _Search:
         self.hopeless += solver.closest is not None
         census = Census()
         census.add(self._loss(solved))
-        if elsewhere and not self._searched and solved.status == CONVERGED:
+        if elsewhere and not self._searched and solved.status == CONVERGED and not solver.is_least(solved, self.reference):
             self._searched.add(method)
             others = self._drawn(solver, solved, census, self.loop.work + LITTLE)
             best = min([solved, *others], key=lambda one: self._task.loss(one.F))

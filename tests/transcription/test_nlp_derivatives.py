@@ -11,9 +11,9 @@ from cases import oscillator
 from euler import Euler
 
 from problems import Problem, load
-from transcription import DFET, NLP, MultipleShooting
+from transcription import DFET, NLP, Collocation, MultipleShooting
 from transcription.nlp import from_points
-from transcription.nlp.derivatives import gradients, hessian, objective_gradients
+from transcription.nlp.derivatives import gradients, hessian, linear_objectives, objective_gradients
 from transcription.nlp.from_points import FromPoints
 from transcription.phases.mesh import PhaseMesh
 
@@ -121,6 +121,23 @@ def test_they_are_as_sparse(case):
     for function, i in ((gradients, 0), (gradients, 1), (hessian, 0)):
         own, other = (function(one).sparsity_out(i).nnz() for one in (nlp, replace(nlp, parts=None)))
         assert 0 < own <= 1.02 * other
+
+
+@pytest.mark.parametrize("method", [DFET(3, 2), Collocation(3, 2), MultipleShooting(3)])
+def test_which_objectives_are_linear(method):
+    """Against slopes at two places; and what is linear in all but one variable is not. By shooting with tables it may not show."""
+    problem = everything()
+    x, t0 = problem.phases["left"]["x"], problem.phases["left"].t0
+    problem.minimize("mixed", 2 * problem.phases["last"].tf - t0)
+    problem.minimize("state", problem.phases["left"].initial(x) + 3)
+    problem.minimize("product", problem.parameters["p"] * t0)
+    problem.minimize("nearly", problem.phases["left"].tf + 1e-9 * problem.parameters["p"] ** 2)
+    nlp = method.transcribe(problem)
+    one, other = (np.array(objective_gradients(nlp)(z)) for z in somewhere(nlp)[:2])
+    linear = (one == other).all(axis=1)
+    assert linear.tolist() == [False, True, True, True, False, False]
+    assert np.array_equal(linear_objectives(nlp), linear) or (nlp.parts is None and not linear_objectives(nlp).any())
+    assert linear_objectives(method.transcribe(load("goddard"))).all()
 
 
 def test_a_design_is_derived_once_for_all_points(monkeypatch):

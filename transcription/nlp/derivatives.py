@@ -44,6 +44,14 @@ def objective_gradients(nlp: NLP) -> ca.Function:
 
 
 @remembered
+def linear_objectives(nlp: NLP) -> np.ndarray:
+    """Mask (m,) of the objectives whose slopes depend on no variable, as a duration's; False where that does not show."""
+    m = len(nlp.problem.goals)
+    places, _ = objective_gradients(nlp).jac_sparsity(0, 0).get_triplet()
+    return ~np.isin(np.arange(m), np.array(places, dtype=int) % m)
+
+
+@remembered
 def hessian(nlp: NLP) -> ca.Function:
     """z, lambda (m,), mu (r,) -> the upper triangle of the Hessian of lambda'F + mu'g, sparse. Raises as `gradients`."""
     refuse_dense(nlp)

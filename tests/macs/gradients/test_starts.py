@@ -9,9 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs import optimize, payoff, sweep
+from macs.gradients.multistart import GradientSolves, MultistartSolver, is_least, single_task
 from macs.gradients.starts import FEWEST, FIRST, MANY, MOST, Census, Starts
 from problems import Problem, load
 from transcription import DFET
+from transcription.nlp.scalarized import Solved
 
 
 def wells(depths: list[float], width: float = 0.02) -> Problem:
@@ -131,3 +133,61 @@ def test_a_sweep_with_one_start_and_with_as_many_as_pay_agree_where_there_is_one
     one, many = (sweep(goddard, points=5, starts=starts) for starts in (1, "auto"))
     assert np.abs(many.F - one.F).max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6 * np.ptp(one.F[:, 0]))
     assert set(many.stats["optima"].values()) == {1} and "starts" in one.solver["settings"]
+
+
+def bounded(**objectives) -> Problem:
+    """Objectives of a parameter in [0, 1], of the duration, which is free in [1, 3], and of where x ends, by names."""
+    problem = Problem("bounded")
+    p = problem.parameter("p", bounds=(0, 1))
+    phase = problem.phase("phase", t0=0.0, tf=(1.0, 3.0))
+    x = phase.state("x", bounds=(-4, 4), initial=0)
+    phase.dynamics(x=phase.control("u", bounds=(-1, 1)))
+    for name, of in objectives.items():
+        problem.minimize(name, of(p, phase.tf, phase.final(x)))
+    return problem
+
+
+def test_where_bounds_allow_no_less_no_other_start_is_made():
+    """As one objective of two, whose end keeps it and has the least of the other, and alone. Bounds of x would allow less than there is."""
+    both = bounded(duration=lambda p, tf, x: 2 * tf - p, reach=lambda p, tf, x: x)
+    front = payoff(both, DFET(2, 2))
+    assert front.stats["starts"]["duration"] == 1 < front.stats["starts"]["reach"]
+    assert pytest.approx(np.array([[1.0, -1.0], [5.0, -3.0]]), abs=1e-6) == front.F
+    point = optimize(both, DFET(2, 2), objective="duration")
+    assert point.alone().stats["starts"] == 1 and point.F[0] == pytest.approx(1.0, abs=1e-6)
+    assert optimize(both, DFET(2, 2), objective="reach").alone().stats["starts"] > 1
+    alone = optimize(bounded(duration=lambda p, tf, x: 2 * tf - p))
+    assert alone.alone().stats["starts"] == 1 and alone.F[0] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("top", [0.3, 0.7])
+def test_at_a_bound_there_are_other_starts_unless_an_objective_is_linear(top):
+    """Of a hill between two bounds, each bound is an optimum."""
+    point = optimize(bounded(hill=lambda p, tf, x: -((p - top) ** 2)), DFET(1, 1))
+    assert point.F[0] == pytest.approx(-(max(top, 1 - top) ** 2), abs=1e-6) and point.alone().stats["starts"] > 1
+
+
+def test_what_bounds_allow():
+    """Against the values themselves; what has a period goes on beyond its bounds."""
+    problem = bounded(duration=lambda p, tf, x: tf - p, most=lambda p, tf, x: -3 * p, square=lambda p, tf, x: tf**2, end=lambda p, tf, x: x)
+    turn = problem.phases["phase"].control("turn", bounds=(0, 1), period=1)
+    problem.minimize("turn", problem.phases["phase"].initial(turn))
+    solver = MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
+    names = [v.name.split("[")[0] for v in solver.nlp.variables]
+    place, end, last = names.index("p"), names.index("phase.tf"), [v.name for v in solver.nlp.variables].index("phase.turn[0,1]")
+
+    def least(p: float, tf: float, status: str = "converged") -> list[bool]:
+        z = solver.nlp.lower.copy()
+        z[[place, end, last]] = p, tf, 1.0  # the turn at the beginning grows with its first node, and falls with its last
+        solved = Solved(z, *solver.nlp.evaluate(z[None])[0], 0.0, status, 1)
+        return [solver.is_least(solved, single_task(i, 5)[0]) for i in range(5)]
+
+    assert least(1.0, 1.0) == [True, True, False, True, False]
+    assert least(1.0, 1.001) == [False, True, False, True, False]
+    assert least(0.999, 1.0) == [False, False, False, True, False]
+    assert least(1.0 - 1e-9, 1.0 + 1e-9) == [True, True, False, True, False]
+    assert not any(least(1.0, 1.0, "failed"))
+    best = solver.nlp.lower.copy()
+    best[[place, end]] = 1.0, 1.0
+    one, two = (np.where(np.arange(5) < k, 0.0, np.inf) for k in (1, 2))
+    assert is_least(solver.nlp, best, one) and not is_least(solver.nlp, best, two)
