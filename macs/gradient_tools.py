@@ -88,8 +88,8 @@ def optimize(
     starts : int or "auto"
         Number of starts: the first is `start` or the problem's guess, the others are drawn: from everywhere in the bounds, and near the
         best that is known. The best result is returned. "auto": as many as pay; some twenty where each finds the same, fewer where a solve
-        takes long, one where a linear objective is at its bound. `stats` has the number of `starts`, how many different `optima` they found,
-        and how often that which is returned was `found`; if only once, `message` says so: there may be better ones.
+        takes long, one where a linear objective is at its bound. `stats` has the number of `starts`, how many different `optima` they
+        found, and how often that which is returned was `found`; if only once, `message` says so: there may be better ones.
     seed : int, optional
         Seed of the starts that are drawn. None draws one, which is recorded in `stats`.
     tolerance : float
