@@ -14,7 +14,7 @@ from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
 from transcription.meshed import Meshed
 from transcription.meshes.adaptation import next_method, redistributed, where_controls_gain
-from transcription.meshes.knots import switched
+from transcription.meshes.knots import at_switches, switched
 from transcription.meshes.minimum import Optimum
 from transcription.meshes.scales import objective_variations
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
@@ -139,6 +139,15 @@ class OnMesh:
         elif not self.change <= self.verdict.wanted.settled:
             found.append(f"its objectives still change by {self.change:.1e} of the front's range from mesh to mesh")
         return found
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A mesh to be tried; whether its result must be an improvement to be taken; and whether it is sought near by first."""
+
+    method: Meshed
+    better: bool = False
+    near: bool = False
 
 
 @dataclass(eq=False)
@@ -271,15 +280,15 @@ class MeshLoop:
         least = _achieved(begun, task)
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
-            for method, better in self._proposals(present, waiting, self._knots and detours > 0):
+            for proposal in self._proposals(present, waiting, self._knots and detours > 0):
                 try:
-                    reached, last = self._solved(method, present, task, others, least)
+                    reached, last = self._solved(proposal, present, task, others, least)
                 except Stopped:
                     # In the middle of it: the point stays on its best mesh so far.
                     break
-                found.meshes.append(method)
+                found.meshes.append(proposal.method)
                 failed = reached is None
-                if better and reached is not None and not self._improves(reached, present, task, least):
+                if proposal.better and reached is not None and not self._improves(reached, present, task, least):
                     reached = None
                 status = status or last
                 if reached is not None or self.ended or not detours or len(found.meshes) >= self.limit:
@@ -317,31 +326,36 @@ class MeshLoop:
         errors = reached.verdict.error <= max(1.0, present.verdict.error)
         return errors and task.loss(reached.F) <= least + self.wanted.settled
 
-    def _proposals(self, present: OnMesh, waiting: list[Meshed], knotted: bool) -> Iterator[tuple[Meshed, bool]]:
-        """The next mesh, and others to be tried where no solve converges on it; each with whether it must be an improvement to be taken."""
+    def _proposals(self, present: OnMesh, waiting: list[Meshed], knotted: bool) -> Iterator[Proposal]:
+        """The next mesh, and others to be tried where no solve converges on it."""
         seen = {present.method}
         while waiting:
             hint = waiting.pop(0)
-            yield hint, hint != present.method
+            yield Proposal(hint, better=hint != present.method)
         if not self._more:
-            yield redistributed(present.method, self.problem, present.trajectory), False
+            yield Proposal(redistributed(present.method, self.problem, present.trajectory))
             return
         if present.gaining and not present.verdict.complaints():
             cut = where_controls_gain(present.method, present.verdict, present.trajectory)
             if cut not in seen:
-                yield cut, False
+                yield Proposal(cut)
         knots = switched(present.method, self.problem, present.trajectory) if knotted else None
         if knots is not None and knots not in seen:
-            yield knots, True
-        finer = next_method(present.method.settled(present.trajectory), present.verdict, present.trajectory)
+            yield Proposal(knots, better=True)
+        resting = at_switches(present.method, present.trajectory)
+        begun = present.method.settled(present.trajectory) if resting is None else resting
+        finer = next_method(begun, present.verdict, present.trajectory)
         if finer not in seen:
-            yield finer, False
-            yield from ((method, False) for method in finer.alternatives())
+            yield Proposal(finer, near=resting is not None)
+            yield from map(Proposal, finer.alternatives())
 
-    def _solved(self, method: Meshed, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[OnMesh | None, str]:
+    def _solved(
+        self, proposal: Proposal, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float
+    ) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""
+        method = proposal.method
         nlp = self.programs(method)
-        solved, by_gradients = self._from_starts(nlp, present, task, others, least)
+        solved, by_gradients = self._from_starts(nlp, present, task, others, least, proposal.near)
         if solved.status != CONVERGED:
             return None, solved.status
         z, F = solved.z, solved.F
@@ -352,15 +366,19 @@ class MeshLoop:
         tried = present.gaining and change <= HOLLOW * present.verdict.gain
         return replace(reached, change=change, tried=tried), solved.status
 
-    def _from_starts(self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float) -> tuple[Solved, bool]:
-        """The best result of solves from the present trajectory and, if that fails or gets worse, near it and from others, and whether it
-        is an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point nearest to the present one."""
+    def _from_starts(
+        self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float, near_first: bool
+    ) -> tuple[Solved, bool]:
+        """The best result of solves from the present trajectory and, if that fails or gets worse, near it, or the other way round, and
+        from others; and whether it is an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point
+        nearest to the present one."""
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
         best = None
         slip = min(SLIP * self.wanted.settled, DRIFT)
-        attempts = [(present.trajectory, False, slip), (present.trajectory, True, DRIFT), *((other, False, DRIFT) for other in others)]
+        own = [(present.trajectory, near_first, slip), (present.trajectory, not near_first, DRIFT)]
+        attempts = [*own, *((other, False, DRIFT) for other in others)]
         for trajectory, near, drift in attempts:
             with self.solves.nearby() if near else nullcontext():
                 solved = task.solve(self.solves, nlp, nlp.interpolate(trajectory))

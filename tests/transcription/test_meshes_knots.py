@@ -15,7 +15,7 @@ from macs import optimize
 from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET, parse
-from transcription.meshes.knots import knots, next_mesh, on_bounds, phase_switches, switched, with_knots
+from transcription.meshes.knots import at_switches, knots, next_mesh, on_bounds, phase_switches, switched, with_knots
 from transcription.meshes.switches import INSIDE, LOWER, UPPER, Switch
 from transcription.nlp.scalarized import scalarize
 from transcription.phases.mesh import PhaseMesh
@@ -298,6 +298,49 @@ def test_an_edge_that_can_go_no_further_begins_anew():
     problem, method, flight = flown((0, 0.25, 0.5, 0.75, 1), (2,), [full, full, [3.0, 1.5, 0.0], off], [0.5])
     (found,) = phase_switches(flight["fall"])["u"]
     assert found.place == pytest.approx(0.625, abs=0.01) and switched(method, problem, flight) is None
+
+
+def test_edges_begin_at_the_switches_that_they_have_left():
+    off, full, falling = [0.0, 0.0, 0.0], [3.0, 3.0, 3.0], [3.0, 1.5, 0.0]
+    _, method, flight = flown((0, 0.25, 0.5, 0.75, 1), (2,), [full, full, falling, off], [0.5])
+    (found,) = phase_switches(flight["fall"])["u"]
+    mesh = at_switches(method, flight).mesh_of("fall")
+    assert mesh.edges == pytest.approx((0, found.place / 2, found.place, (1 + found.place) / 2, 1), abs=1e-12) and found.place > 0.6
+    # At its switch an edge stays exactly.
+    _, method, flight = flown((0, 0.5, 1), (1,), [off, full], [0.8], {"u": (0, 1)})
+    assert at_switches(method, flight) == method.settled(flight) != method
+
+
+@pytest.mark.parametrize(
+    ("edges", "moving", "values", "places"),
+    [
+        ((0, 0.5, 1), (), [0.0, 3.0], []),  # no moving edge
+        ((0, 0.5, 1), (1,), [3.0, 3.0], [0.5]),  # no switch
+        ((0, 0.3, 0.6, 1), (1,), [0.0, 3.0, 0.0], [0.3]),  # two
+        ((0, 0.1, 0.2, 0.6, 1), (1, 2), [3.0, 3.0, 3.0, 0.0], [0.1, 0.2]),  # one for two edges
+        ((0, 0.1, 0.12, 0.5, 1), (1, 2), [3.0, 3.0, 0.0, 3.0], [0.1, 0.12]),  # beyond the range of the first
+    ],
+)
+def test_edges_that_have_no_switches_stay(edges, moving, values, places):
+    _, method, flight = flown(edges, moving, [[one] * 3 for one in values], places)
+    assert at_switches(method, flight) is None
+
+
+def test_a_method_that_moves_no_edges_has_none_at_switches():
+    landing, *_ = moon_landing()
+    assert at_switches(Euler(20), optimize(landing, Euler(20), starts=1).trajectory) is None
+
+
+@pytest.mark.slow
+def test_on_finer_meshes_edges_are_where_controls_switch():
+    """Those of the hang glider's lift, which leaves its greatest value and reaches it again, mattered little to a coarser mesh."""
+    point = optimize(load("standard/hang_glider"), starts=1)
+    (phase,) = point.trajectory.phases
+    mesh = PhaseMesh.of(point.transcription["settings"]["mesh"][phase.name])
+    places = [one.place for one in phase_switches(phase)["lift"]]
+    edges = phase.state.edges / phase.tf
+    assert len(mesh.moving) == len(places) == 2
+    assert edges[list(mesh.moving)] == pytest.approx(places, abs=0.05 / mesh.elements)
 
 
 def test_moving_edges_stay_when_elements_are_cut():

@@ -74,20 +74,65 @@ def next_mesh(method: Meshed, statement: CompiledPhase, phase: PhaseTrajectory, 
     """The mesh of one phase that `switched` proposes, if any; `parameters` are those of the problem."""
     if not phase.tf > phase.t0:
         return None
-    given = method.mesh_of(phase.name)
-    mesh = given.found_in(phase.state.edges)
-    known = np.array(mesh.edges)[list(mesh.moving)]
-    low, high = given.ranges().T
-    slack = PRESSED * (high - low)
-    pressed = np.where(known <= low + slack, -1, np.where(known >= high - slack, 1, 0))
-    found = phase_switches(phase)
-    places = knots(found, phase_contacts(statement, phase, parameters), mesh, pressed)
+    edges = _Edges.of(method, phase)
+    mesh, found = edges.mesh, phase_switches(phase)
+    places = knots(found, phase_contacts(statement, phase, parameters), mesh, edges.pressed)
     # Within the ranges the solver has moved the edges itself: where a control comes near a bound slowly, it knows better.
-    if len(places) == len(known) and (low <= places).all() and (places <= high).all():
-        return mesh if pressed.any() else replace(mesh, constant=()) if mesh.constant else None
+    if edges.reach(places):
+        return mesh if edges.pressed.any() else replace(mesh, constant=()) if mesh.constant else None
     if len(places) >= max(method.most_elements, 2 * method.elements):
         return None
     return with_knots(mesh, places, on_bounds(phase, found, places))
+
+
+def at_switches(method: Method, trajectory: Trajectory) -> Method | None:
+    """The same method on the meshes of a trajectory that it made, with all moving edges at switches of controls, where a finer mesh is to
+    begin: its edges may have left them.
+
+    Where an edge may move, an objective has many local optima that differ by less than what counts, since one element of high degree
+    describes the end of an arc nearly as well as two do. In these, the costates are known less well.
+
+    Returns
+    -------
+    Meshed or None
+        None: there are no moving edges, or not as many as switches, or one cannot reach its own. Ends of contacts with limits, which are
+        known less well, are no switches here.
+    """
+    if not method.moves_edges:
+        return None
+    found = {}
+    for phase in trajectory.phases:
+        if method.mesh_of(phase.name).moving and phase.tf > phase.t0:
+            edges = _Edges.of(method, phase)
+            places = knots(phase_switches(phase), {}, edges.mesh, edges.pressed)
+            if not edges.reach(places):
+                return None
+            found[phase.name] = edges.mesh.moved(np.array(places))
+    return method.remeshed(found) if found else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """The mesh of a phase as it lies in a trajectory; whether its moving edges are at the lower or the upper ends of their ranges, -1 or 1,
+    or within, 0; and these ranges (m, 2)."""
+
+    mesh: PhaseMesh
+    pressed: np.ndarray
+    ranges: np.ndarray
+
+    @classmethod
+    def of(cls, method: Meshed, phase: PhaseTrajectory) -> _Edges:
+        """Those of a phase of a trajectory that the method made."""
+        given = method.mesh_of(phase.name)
+        mesh, ranges = given.found_in(phase.state.edges), given.ranges()
+        known, (low, high) = np.array(mesh.edges)[list(mesh.moving)], ranges.T
+        slack = PRESSED * (high - low)
+        return cls(mesh, np.where(known <= low + slack, -1, np.where(known >= high - slack, 1, 0)), ranges)
+
+    def reach(self, places: Sequence[float]) -> bool:
+        """Whether there are as many places as moving edges, each within the range of its edge."""
+        low, high = self.ranges.T
+        return len(places) == len(low) and bool((low <= places).all() and (places <= high).all())
 
 
 def phase_switches(phase: PhaseTrajectory) -> dict[str, list[Switch]]:
