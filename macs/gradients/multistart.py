@@ -286,7 +286,7 @@ class MultistartSolver:
         return alpha is not None and (known is None or alpha < known - BETTER)
 
     def is_least(self, solved: Solved, reference: np.ndarray) -> bool:
-        """Whether a result has the least of the only objective of a problem that bounds allow, see `scalarize` and `is_least`."""
+        """Whether a result converged and is the least that bounds allow, see `is_least` beside this class; reference (m,)."""
         return solved.status == CONVERGED and is_least(self.nlp, solved.z, reference)
 
     def nearest(self, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
@@ -308,7 +308,7 @@ class MultistartSolver:
 
 def is_least(nlp: NLP, z: np.ndarray, reference: np.ndarray) -> bool:
     """Whether a vector (n,) has the least value that the bounds of variables allow an objective to have: where it is linear, and the only
-    one of the problem with this reference (m,). No other start can then lead to less."""
+    one of the problem with this reference (m,). No other start can then lead to less, by more than the accuracy of solves."""
     (used,) = np.nonzero(reference < np.inf)
     if len(used) != 1:
         return False
