@@ -36,36 +36,16 @@ class Decide(GradientSolver):
     Its front has every choice, those that are dominated included. `stats["choices"]` has, for each, its label, preference, degrees, values,
     steps and message as plain data; `stats["ranges"]` the ranges by which objectives were normalised. A choice is never worse than another
     of the run, by its own preference: where a later one is better, it is made again from there.
-
-    Parameters
-    ----------
-    choices : dict
-        By label: a `Preference`, or one as plain data, {"method": ..., "settings": {...}}. As data, it may have two keys more. "vary" has
-        settings that take several values, {setting: [values]}: a choice for each, of which the label names them. "loop": true raises
-        lambda until the order of priority is kept (`satisfy`).
-    starts : int or "auto"
-        Number of starts of each solve; see `decide`.
-    mesh : "fixed" or "mended"
-        Choices, and the ends of the front where these are found first, stay on the transcription that is given and are only marked; or
-        those that a simulation does not confirm are solved again, as by `decide` without a transcription.
-    sweep : int
-        Points of a sweep that is made first, whose points are known then; 0: the ends of the front alone.
-    known : str, optional
-        File with a front of the problem, which is known instead.
-    ranges : Ranges or dict, optional
-        By which objectives are normalised, {"best": {...}, "worst": {...}}. Default: those of the points that are known.
-
-    Raises
-    ------
-    ValueError
-        For no choice, a preference that is stated wrongly, and settings out of their ranges.
     """
 
-    starts: int | str = AUTO
+    starts: int | str = AUTO  # number of starts of each solve; see `decide`
+    # By label: a `Preference`, or one as plain data, {"method": ..., "settings": {...}}. As data, it may have two keys more. "vary" has
+    # settings that take several values, {setting: [values]}: a choice for each, of which the label names them. "loop": true raises lambda
+    # until the order of priority is kept (`satisfy`).
     choices: Mapping[str, Any] = field(default_factory=dict)
-    sweep: int = 0
-    known: str | None = None
-    ranges: Any = None
+    sweep: int = 0  # points of a sweep that is made first, whose points are known then; 0: the ends of the front alone
+    known: str | None = None  # file with a front of the problem, which is known instead
+    ranges: Any = None  # by which objectives are normalised, {"best": {...}, "worst": {...}}. Default: those of the points that are known.
 
     MESHES: ClassVar[tuple[str, ...]] = ("fixed", "mended")
 

@@ -33,23 +33,12 @@ class GradientSolver(Solver):
 
     It evaluates no candidates: `evaluations` and `inner` are not used, and its cost is in `gradient_solves` and `inner_iterations`. No
     checkpoint keeps a run of it: it begins again.
-
-    Parameters
-    ----------
-    starts : int or "auto"
-        Number of starts of each solve; "auto": as many as pay, see `macs.optimize`.
-    mesh : "fixed", "mended", "adaptive" or "density"
-        What follows on a transcription that is given: nothing; points that a simulation does not confirm are solved again
-        (`Front.mended`); each point gets a mesh of its own (`Front.refine_mesh`); or as many elements, where trajectories need them
-        (`Front.refine_mesh(more=False)`).
-
-    Raises
-    ------
-    ValueError
-        Where a setting is out of its range.
     """
 
-    starts: int | str = AUTO
+    starts: int | str = AUTO  # number of starts of each solve; "auto": as many as pay, see `macs.optimize`
+    # What follows on a transcription that is given: nothing; points that a simulation does not confirm are solved again (`Front.mended`);
+    # each point gets a mesh of its own (`Front.refine_mesh`); or as many elements, where trajectories need them
+    # (`Front.refine_mesh(more=False)`).
     mesh: str = "fixed"
 
     def __post_init__(self) -> None:
@@ -143,17 +132,9 @@ class Payoff(GradientSolver):
 
 @dataclass(frozen=True)
 class Optimum(GradientSolver):
-    """The best of one objective by gradients, a front of one point: `macs.optimize` as a solver.
+    """The best of one objective by gradients, a front of one point: `macs.optimize` as a solver."""
 
-    Parameters
-    ----------
-    objective : str, optional
-        Its name. Default: the first one.
-    starts, mesh
-        See `GradientSolver`.
-    """
-
-    objective: str | None = None
+    objective: str | None = None  # its name. Default: the first one.
 
     def find(self, problem: Problem | CompiledProblem, transcription: Transcription | None, **terms: Any) -> Front:
         """See `optimize`, also for what it raises where it is ended before the first solve. If no solve converged, the front is empty, and
@@ -167,19 +148,10 @@ class Optimum(GradientSolver):
 
 @dataclass(frozen=True)
 class Sweep(GradientSolver):
-    """A front by gradients, point after point: `macs.sweep` as a solver.
-
-    Parameters
-    ----------
-    points : int
-    method : str
-        See `macs.sweep`.
-    starts, mesh
-        See `GradientSolver`.
-    """
+    """A front by gradients, point after point: `macs.sweep` as a solver."""
 
     points: int = 10
-    method: str = "pascoletti-serafini"
+    method: str = "pascoletti-serafini"  # see `macs.sweep`
 
     def __post_init__(self) -> None:
         super().__post_init__()

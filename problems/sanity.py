@@ -20,14 +20,7 @@ Labels = Mapping[str, Sequence[str]]
 
 
 def check_numbers(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
-    """Raise a ValueError that names an expression which is not a finite number wherever we look within the bounds.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    labels : sequence of mappings
-        For each phase, by name of its Functions, what to call each of their rows.
-    """
+    """Raise a ValueError that names an expression which is not a finite number wherever we look within the bounds."""
     _sampled(problem, labels)
 
 

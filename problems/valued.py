@@ -79,29 +79,14 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Valued:
-    """A problem whose one objective is a function of those of another.
+    """A problem whose one objective is a function of those of another."""
 
-    Attributes
-    ----------
-    problem : CompiledProblem
-        Its objective is 1 + (value - zero) / unit.
-    original : CompiledProblem
-    further : tuple of Variable
-        Its further parameters, which come after those of the original.
-    names : tuple of str
-        Names of its objective's objectives: those that the first of the further parameters stand for.
-    follow : Function
-        Objectives (m, k), in the user's units -> the further parameters that belong to them.
-    zero, unit : float
-        A value that is nearly the least, and what counts as one in it.
-    """
-
-    problem: CompiledProblem
+    problem: CompiledProblem  # its objective is 1 + (value - zero) / unit
     original: CompiledProblem
-    further: tuple[Variable, ...]
-    names: tuple[str, ...]
-    follow: ca.Function
-    zero: float
+    further: tuple[Variable, ...]  # its further parameters, which come after those of the original
+    names: tuple[str, ...]  # names of its objective's objectives: those that the first of the further parameters stand for
+    follow: ca.Function  # objectives (m, k), in the user's units -> the further parameters that belong to them
+    zero: float  # zero, unit: A value that is nearly the least, and what counts as one in it
     unit: float
 
     def value(self, objective: float) -> float:
@@ -136,24 +121,7 @@ class Valued:
 def valued(
     problem: CompiledProblem, aim: Valuation, box: Box, *, kept: Sequence[tuple[Valuation, float]] = (), zero: float = 0.0
 ) -> Valued:
-    """The problem with a function of its objectives in their place.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    aim : Valuation
-        The function.
-    box : Box
-    kept : sequence of (Valuation, float)
-        Functions that may not exceed these values.
-    zero : float
-        See `Valued`.
-
-    Raises
-    ------
-    ValueError
-        If a peak would be used otherwise than minimised or bounded above.
-    """
+    """The problem with a function of its objectives in their place."""
     program = _Program(problem, [aim, *(one for one, _ in kept)], box)
     values, scales, unit = program.values, program.spreads, program.spreads[0]
     objective = 1.0 + (values[0] - zero) / unit

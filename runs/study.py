@@ -34,17 +34,7 @@ QUICK_RUNS, QUICK_EVALUATIONS, QUICK_LEAST, MANY_CELLS = 2, 500, 50, 8
 
 
 def _key(kind: Any = None, *, decides: bool = False, record: Callable[[Any], Any] | None = plain) -> dict[str, Any]:
-    """The metadata of a field of `Study` that is a key of study files.
-
-    Parameters
-    ----------
-    kind : type
-        Of its values, see `checked`. None if it has a check of its own.
-    decides : bool
-        Whether it decides the runs' numbers, so that it must not change between two calls on one folder.
-    record : callable or None
-        Makes its value plain data for the study's record; None if the cells contain it.
-    """
+    """The metadata of a field of `Study` that is a key of study files."""
     return {"kind": kind, "decides": decides, "record": record}
 
 

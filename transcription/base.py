@@ -120,21 +120,11 @@ def kept_nlp(problem: CompiledProblem, transcription: Transcription) -> NLP | No
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """The free variables that are one control of one phase.
+    """The free variables that are one control of one phase."""
 
-    Attributes
-    ----------
-    name : str
-        "phase.control".
-    columns : array (k,) of int
-        Which of the free variables they are, in their order in time.
-    places : array (k,)
-        Where along the phase they lie: 0 at t0, 1 at tf.
-    """
-
-    name: str
-    columns: np.ndarray
-    places: np.ndarray
+    name: str  # "phase.control"
+    columns: np.ndarray  # (k,): Which of the free variables they are, in their order in time
+    places: np.ndarray  # (k,): Where along the phase they lie: 0 at t0, 1 at tf
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -42,14 +42,7 @@ def feasible_first(F: np.ndarray, cv: np.ndarray) -> Presented:
     """Superiority of feasible solutions (Deb 2000): feasible points are compared by objectives, infeasible ones by violation.
 
     This is Definition 1 of Chai and others (2020) except for its third line: feasible points are compared by Pareto dominance, which does
-    not require every single objective to be better.
-
-    Parameters
-    ----------
-    F : array (n, m)
-        Objectives; NaN where the evaluation failed.
-    cv : array (n,)
-        See `excess`.
+    not require every single objective to be better. F (n, m), cv (n,).
     """
     return _finite(F, cv), cv
 
@@ -114,19 +107,7 @@ DEGREES = ("largest", *SUMS)
 
 
 def degree(name: str, violation: np.ndarray, violations: Callable[[], np.ndarray], tolerance: float) -> np.ndarray:
-    """Degree of violation (k,) of points: infinite if the evaluation failed, positive if the violation exceeds the tolerance.
-
-    Parameters
-    ----------
-    name : str
-        One of `DEGREES`; "largest" is the violation itself.
-    violation : array (k,)
-        Infinite where the evaluation failed.
-    violations : callable
-        Function that returns the violation of each constraint, (k, c); called only if needed.
-    tolerance : float
-        A constraint with a violation of at most this is satisfied.
-    """
+    """Degree of violation (k,) of points: infinite if the evaluation failed, positive if the violation exceeds the tolerance."""
     if name == "largest":
         return violation
     v = np.nan_to_num(violations(), nan=np.inf, posinf=np.inf)

@@ -15,20 +15,12 @@ from .pymoo_adapter import rows_of, variation
 
 @dataclass(repr=False)
 class TwoArchiveState(State):
-    """State of C-TAEA. The members are the archive that converges.
-
-    Attributes
-    ----------
-    diversity : Members
-        The other archive, in its order; none before the first population is presented to the algorithm.
-    ideal : array (m,)
-        Best value of each objective so far, as presented to the algorithm; infinite before the first population.
-    """
+    """State of C-TAEA. The members are the archive that converges."""
 
     SHAPES: ClassVar[dict[str, str]] = {"ideal": "presented"}
 
-    diversity: Members
-    ideal: np.ndarray
+    diversity: Members  # the other archive, in its order; none before the first population is presented to the algorithm
+    ideal: np.ndarray  # (m,): Best value of each objective so far, as presented to the algorithm; infinite before the first population
 
 
 @dataclass(frozen=True)

@@ -18,17 +18,11 @@ from .pymoo_adapter import variation
 
 @dataclass
 class DecomposedState(State):
-    """State of MOEA/D. Member i is the best for direction i.
-
-    Attributes
-    ----------
-    ideal : array (m,)
-        Best value of each objective so far, as presented to the algorithm.
-    """
+    """State of MOEA/D. Member i is the best for direction i."""
 
     SHAPES: ClassVar[dict[str, str]] = {"ideal": "presented"}
 
-    ideal: np.ndarray
+    ideal: np.ndarray  # (m,): Best value of each objective so far, as presented to the algorithm
 
 
 @dataclass(frozen=True)

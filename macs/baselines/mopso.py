@@ -22,29 +22,15 @@ SETTLING = 20
 
 @dataclass(repr=False)
 class ParticleState(State):
-    """State of MOPSO. The members are the particles, in their order.
-
-    Attributes
-    ----------
-    best : Members
-        Best position of each particle.
-    leaders : Members
-        Archive of the algorithm, from which leaders are drawn.
-    velocity : array (n, d)
-        In spans of the variables.
-    launched : int
-        Number of evaluations after which the swarm was complete and began to move; -1 as long as first particles are drawn.
-    means : array (k, m)
-        Mean of the front after each of the last iterations of a swarm that moves, at most `SETTLING` and one.
-    """
+    """State of MOPSO. The members are the particles, in their order."""
 
     SHAPES: ClassVar[dict[str, str]] = {"velocity": "members d", "means": "k m"}
 
-    best: Members
-    leaders: Members
-    velocity: np.ndarray
-    launched: int
-    means: np.ndarray
+    best: Members  # best position of each particle
+    leaders: Members  # archive of the algorithm, from which leaders are drawn
+    velocity: np.ndarray  # (n, d): In spans of the variables
+    launched: int  # number of evaluations after which the swarm was complete and began to move; -1 as long as first particles are drawn
+    means: np.ndarray  # (k, m): Mean of the front after each of the last iterations of a swarm that moves, at most `SETTLING` and one
 
 
 @dataclass(frozen=True)
@@ -295,18 +281,7 @@ def velocities(
     """New velocities (n, d): w V + c1 r1 (best - X) + c2 r2 (leaders - X), for a time step of 1.
 
     This is eq. (22) with the sign of its differences corrected; with the printed sign, particles would move away from what attracts them.
-
-    Parameters
-    ----------
-    box : Box
-    X, V, best, leaders : arrays (n, d)
-        Positions and velocities of the particles, their best positions, and their leaders. Differences of periodic variables go the shorter
-        way.
-    weights : (w, c1, c2)
-    chance : array (2, n, d)
-        r1 and r2, in [0, 1].
-    largest : float
-        Limit of each component of the velocity.
+    X, V, best, leaders (n, d), chance (2, n, d).
     """
     w, c1, c2 = weights
     V = w * V + c1 * chance[0] * box.difference(best, X) + c2 * chance[1] * box.difference(leaders, X)

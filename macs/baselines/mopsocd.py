@@ -14,23 +14,13 @@ from .pymoo_adapter import Baseline, rows_of
 
 @dataclass(repr=False)
 class SwarmState(State):
-    """State of MOPSO-CD. The members are the particles, in their order.
-
-    Attributes
-    ----------
-    best : Members
-        Best position of each particle.
-    leaders : Members
-        Archive of the algorithm, in its order, from which leaders are drawn.
-    velocity : array (n, d)
-        In the user's units.
-    """
+    """State of MOPSO-CD. The members are the particles, in their order."""
 
     SHAPES: ClassVar[dict[str, str]] = {"velocity": "n d"}
 
-    best: Members
-    leaders: Members
-    velocity: np.ndarray
+    best: Members  # best position of each particle
+    leaders: Members  # archive of the algorithm, in its order, from which leaders are drawn
+    velocity: np.ndarray  # (n, d): In the user's units
 
 
 @dataclass(frozen=True)

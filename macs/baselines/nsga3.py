@@ -15,21 +15,13 @@ from .pymoo_adapter import variation
 
 @dataclass(repr=False)
 class NormalisedState(State):
-    """State of NSGA-III, with the points by which objectives, as presented to the algorithm, are normalised.
-
-    Attributes
-    ----------
-    ideal, worst : arrays (m,)
-        Best and worst value of each objective so far; infinite before the first population.
-    extreme_points : array (m, m) or (0, m)
-        Points that span the hyperplane; none before the first population.
-    """
+    """State of NSGA-III, with the points by which objectives, as presented to the algorithm, are normalised."""
 
     SHAPES: ClassVar[dict[str, str]] = {"ideal": "presented", "worst": "presented", "extreme_points": "e presented"}
 
-    ideal: np.ndarray
+    ideal: np.ndarray  # ideal, worst: (m,): Best and worst value of each objective so far; infinite before the first population
     worst: np.ndarray
-    extreme_points: np.ndarray
+    extreme_points: np.ndarray  # (m, m): Points that span the hyperplane; none before the first population
 
 
 @dataclass(frozen=True)

@@ -19,27 +19,14 @@ from . import constraints
 
 @dataclass(repr=False)
 class State:
-    """State of a solver with a population between two iterations. Each solver adds its own fields.
+    """State of a solver with a population between two iterations. Each solver adds its own fields."""
 
-    Attributes
-    ----------
-    members : Members
-        The population.
-    archive : Archive
-        The present front: feasible, mutually non-dominated and different points.
-    closest : Archive
-        The least violated point evaluated, one row, as long as the archive is empty; no row afterwards.
-    iteration : int
-        Generations after the first population.
-    first_feasible, all_feasible : int
-        First generation with one feasible member, and with all members feasible; the first population is generation 1. 0: none so far.
-    rng : numpy.random.Generator
-    """
-
-    members: Members
-    archive: Archive
-    closest: Archive
-    iteration: int
+    members: Members  # the population
+    archive: Archive  # the present front: feasible, mutually non-dominated and different points
+    closest: Archive  # the least violated point evaluated, one row, as long as the archive is empty; no row afterwards
+    iteration: int  # generations after the first population
+    # first_feasible, all_feasible: First generation with one feasible member, and with all members feasible; the first population is
+    # generation 1. 0: none so far.
     first_feasible: int
     all_feasible: int
     rng: np.random.Generator
@@ -146,23 +133,11 @@ def thinned(given: np.ndarray, size: int) -> np.ndarray:
 
 @dataclass(frozen=True, repr=False)
 class Members(Archive):
-    """Evaluated points of a population, feasible or not.
-
-    Attributes
-    ----------
-    Z : array (n, D)
-        Full vectors, in the user's units, after the evaluation.
-    F : array (n, m)
-        Objectives, all minimised; NaN where the evaluation failed.
-    violation : array (n,)
-        Largest scaled residual of any constraint; infinite where the evaluation failed.
-    degree : array (n,)
-        Number by which infeasible points are ranked; see `constraints.degree`.
-    """
+    """Evaluated points of a population, feasible or not. Z (n, D), F (n, m), violation (n,)."""
 
     SHAPES: ClassVar[dict[str, str]] = Archive.SHAPES | {"degree": "n"}
 
-    degree: np.ndarray
+    degree: np.ndarray  # (n,): Number by which infeasible points are ranked; see `constraints.degree`
 
 
 def evaluate(evaluator: Evaluator, Z: np.ndarray, by: str) -> Members:

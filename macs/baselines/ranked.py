@@ -17,19 +17,12 @@ UNRANKED = -1
 
 @dataclass(repr=False)
 class RankedState(State):
-    """State with the quantities that tournaments compare.
-
-    Attributes
-    ----------
-    rank : array (n,) of int
-        Rank of each member's front, 0 for the best; -1 for an infeasible member.
-    crowding : array (n,)
-        Distances from other members, as the algorithm measures them; a larger one wins. NaN for an infeasible member.
-    """
+    """State with the quantities that tournaments compare."""
 
     SHAPES: ClassVar[dict[str, str]] = {"rank": "members int", "crowding": "members"}
 
-    rank: np.ndarray
+    rank: np.ndarray  # (n,): Rank of each member's front, 0 for the best; -1 for an infeasible member
+    # (n,): Distances from other members, as the algorithm measures them; a larger one wins. NaN for an infeasible member.
     crowding: np.ndarray
 
 

@@ -15,23 +15,13 @@ from .pymoo_adapter import variation
 
 @dataclass(repr=False)
 class GuidedState(State):
-    """State of RVEA. All in objectives as presented to the algorithm.
-
-    Attributes
-    ----------
-    vectors : array (k, m)
-        Reference vectors of length 1, as they were last adapted.
-    ideal : array (m,)
-        Best value of each objective so far among feasible points; infinite before the second generation.
-    nadir : array (m,)
-        Worst value of each objective among the feasible members; infinite before the second generation.
-    """
+    """State of RVEA. All in objectives as presented to the algorithm."""
 
     SHAPES: ClassVar[dict[str, str]] = {"vectors": "k presented", "ideal": "presented", "nadir": "presented"}
 
-    vectors: np.ndarray
-    ideal: np.ndarray
-    nadir: np.ndarray
+    vectors: np.ndarray  # (k, m): Reference vectors of length 1, as they were last adapted
+    ideal: np.ndarray  # (m,): Best value of each objective so far among feasible points; infinite before the second generation
+    nadir: np.ndarray  # (m,): Worst value of each objective among the feasible members; infinite before the second generation
 
 
 @dataclass(frozen=True)

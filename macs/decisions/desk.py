@@ -47,29 +47,10 @@ Result = TypeVar("Result")
 
 
 class Desk:
-    """What is known of a problem, and the solves made so far.
+    """What is known of a problem, and the solves made so far."""
 
-    Parameters
-    ----------
-    statement : Problem or CompiledProblem
-    transcription : Transcription or None
-    ranges : Ranges or None
-        None: those of the points that are known.
-    terms : Terms
-        The other arguments of `decide`.
-    mends : bool
-        Whether points that a simulation does not confirm are solved again also where a transcription is given.
-
-    Attributes
-    ----------
-    known : Points
-        The points of `start`, or of the payoff table.
-    ranges : Ranges
-    history : list of Step
-    """
-
-    known: Points
-    ranges: Ranges
+    known: Points  # the points of `start`, or of the payoff table
+    ranges: Ranges  # none: those of the points that are known
 
     def __init__(
         self,
@@ -149,14 +130,6 @@ class Desk:
 
         A point that was found and those that are known are put in the order of a ranking, see `standing`; the message says what is to be
         known of the first.
-
-        Parameters
-        ----------
-        preference : Preference
-        about : mapping, optional
-            Further numbers of each of its steps.
-        also : sequence of Point
-            Points to begin at, before those that are known.
         """
         stages = preference.stages(self.problem.goals, self.ranges)
         candidates = [*also, *self._ranked(preference)]

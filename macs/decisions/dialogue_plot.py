@@ -30,22 +30,7 @@ def draw_history(
     by: Preference | None = None,
     figure: Any = None,
 ) -> Sequence[Axes]:
-    """Axes with the degrees of choices, a group of bars for each, and one for each objective with its values.
-
-    Parameters
-    ----------
-    goals : m Objectives
-    ranges : Ranges
-        Their ends are broken lines.
-    asked : sequence of str
-        What led to each choice, in words.
-    choices : sequence of Choice
-    by : Preference, optional
-        Whose degrees are shown. Default: of each choice its own; the first one's where smaller degrees are better by some, and worse by
-        others.
-    figure : Figure, optional
-        It is made as large as is needed. Default: a new one.
-    """
+    """Axes with the degrees of choices, a group of bars for each, and one for each objective with its values."""
     import matplotlib
 
     if not choices:

@@ -29,24 +29,6 @@ def improved(
     is given, at their present values. Where nothing is given, others keep their boundaries. Any other preference becomes a `Nimbus` from
     the present point, by which the value that is asked for is enough: without `giving`, all others are free; with it, those that are not
     named keep their values.
-
-    Parameters
-    ----------
-    preference : Preference
-        By which the present point was chosen.
-    ranges : Ranges
-    point : Point
-        The present point.
-    name : str
-    to : float, optional
-        The value that is asked for. Default: the best one.
-    giving : dict, optional
-        By name: the values until which other objectives may become worse.
-
-    Raises
-    ------
-    ValueError
-        For unknown names, a value that is not better than the present one, and limits that are not worse.
     """
     goals, now = point.goals, point.objectives
     given = {} if giving is None or giving == {} else named_numbers(giving, "giving")

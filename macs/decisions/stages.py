@@ -96,18 +96,7 @@ class Kept:
 
 
 class StageSolver:
-    """Solves stages of a preference of one problem.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    best, worst : arrays (m,)
-        The ranges of the objectives, in the user's units.
-    solves : GradientSolves
-        Makes and counts the solves.
-    rng : numpy.random.Generator
-        Of random starts.
-    """
+    """Solves stages of a preference of one problem. best, worst (m,)."""
 
     def __init__(
         self, problem: CompiledProblem, best: np.ndarray, worst: np.ndarray, solves: GradientSolves, rng: np.random.Generator

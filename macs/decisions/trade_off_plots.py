@@ -105,15 +105,7 @@ def _dashes(ax: Any, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> None:
 
 def draw_trade_offs(goals: Sequence[Objective], ranges: np.ndarray, tables: Mapping[str, np.ndarray], figure: Any = None) -> Sequence[Any]:
     """Axes with what all objectives change by when one gets better by a tenth of its range, or by one unit where it has none: a row for
-    each that gets better, darker where the change is more of a range; see `TradeOffs.plot`.
-
-    Parameters
-    ----------
-    goals, ranges : m objectives, array (m,)
-    tables : mapping
-        Derivatives (m, m) of all objectives by that of the row, by title.
-    figure : matplotlib Figure, optional
-    """
+    each that gets better, darker where the change is more of a range; see `TradeOffs.plot`. goals, ranges (m,)."""
     import matplotlib
 
     steps = np.array([_round(STEPS * size) if size > 0 else 1.0 for size in ranges])

@@ -25,15 +25,6 @@ class Bilevel(Evaluator):
 
     The full vector is that of the NLP. Free are the parameters, times, free initial states and controls. The other entries are the states,
     from which the inner solve starts: those of the point that the candidate was made from.
-
-    Parameters
-    ----------
-    nlp : NLP
-    inner : InnerSolver
-    tolerance : float
-        Largest scaled residual of a feasible point.
-    start : Smooth, optional
-        Shape of the first candidates of a search. Default: each variable is drawn independently.
     """
 
     def __init__(self, nlp: NLP, inner: InnerSolver, tolerance: float, start: Smooth | None = None) -> None:

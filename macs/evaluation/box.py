@@ -14,17 +14,11 @@ class Box:
 
     Points are rows X in unit coordinates: 0 at the lower bound, 1 at the upper one. So distances are in spans, whatever the units of the
     variables.
-
-    Attributes
-    ----------
-    lower, upper : arrays (d,)
-        Bounds in the user's units.
-    wraps : array (d,) of bool
-        True for a periodic variable: its bounds are one period wide, and a point that leaves through one re-enters through the other.
     """
 
-    lower: np.ndarray
+    lower: np.ndarray  # lower, upper: (d,): Bounds in the user's units
     upper: np.ndarray
+    # (d,): True for a periodic variable: its bounds are one period wide, and a point that leaves through one re-enters through the other.
     wraps: np.ndarray
 
     @property

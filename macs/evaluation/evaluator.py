@@ -96,32 +96,18 @@ class Evaluation:
 
 @dataclass
 class Counts:
-    """Costs of a run so far.
-
-    Attributes
-    ----------
-    evaluations, inner_iterations, gradient_solves : int
-    fallbacks : int
-        Number of candidates that the fast inner level passed to the slow one.
-    failures : Counter
-        Number of evaluations and gradient solves that did not converge, by status.
-    clocked : int
-        Number of batches and solves that a time limit ended early.
-    work : int
-        Iterations of IPOPT times variables of its program, or what takes about as long: the same on all machines, and comparable for
-        programs of all sizes. Plain functions take none.
-    gradient_work : int
-        Part of the work that gradient solves took.
-    """
+    """Costs of a run so far."""
 
     evaluations: int = 0
     inner_iterations: int = 0
     gradient_solves: int = 0
-    fallbacks: int = 0
-    failures: Counter[str] = field(default_factory=Counter)
-    clocked: int = 0
+    fallbacks: int = 0  # number of candidates that the fast inner level passed to the slow one
+    failures: Counter[str] = field(default_factory=Counter)  # number of evaluations and gradient solves that did not converge, by status
+    clocked: int = 0  # number of batches and solves that a time limit ended early
+    # Iterations of IPOPT times variables of its program, or what takes about as long: the same on all machines, and comparable for
+    # programs of all sizes. Plain functions take none.
     work: int = 0
-    gradient_work: int = 0
+    gradient_work: int = 0  # part of the work that gradient solves took
 
     __repr__ = short_repr
 

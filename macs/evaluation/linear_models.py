@@ -32,20 +32,12 @@ BEYOND = 0.02
 
 @dataclass(frozen=True, repr=False)
 class Samples:
-    """Evaluated points with the residuals of all constraints, oldest first.
-
-    Attributes
-    ----------
-    X : array (s, d)
-        In the unit box.
-    residuals : array (s, c)
-        See `Evaluation.residuals`.
-    """
+    """Evaluated points with the residuals of all constraints, oldest first."""
 
     SHAPES: ClassVar[dict[str, str]] = {"X": "s d", "residuals": "s c"}
 
-    X: np.ndarray
-    residuals: np.ndarray
+    X: np.ndarray  # (s, d): In the unit box
+    residuals: np.ndarray  # (s, c): See `Evaluation.residuals`
 
     @classmethod
     def none(cls, d: int) -> Self:

@@ -121,13 +121,7 @@ class PlainRows:
 
 
 def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
-    """Names (d,), lower and upper bounds (d,) from a sequence of pairs, a pair of sequences longer than two, or a dict of pairs by name.
-
-    Raises
-    ------
-    ValueError
-        If they are not pairs, not finite, reversed or empty; the message names the variable.
-    """
+    """Names (d,), lower and upper bounds (d,) from a sequence of pairs, a pair of sequences longer than two, or a dict of pairs by name."""
     if bounds is None:
         raise ValueError("bounds: missing")
     names = tuple(str(name) for name in bounds) if isinstance(bounds, Mapping) else None

@@ -15,23 +15,12 @@ from transcription.trajectories.limits import excess
 
 @dataclass(frozen=True)
 class Reevaluation:
-    """One point evaluated again; with the names of a `Simulation`.
+    """One point evaluated again; with the names of a `Simulation`."""
 
-    Attributes
-    ----------
-    objectives : dict
-        By name, in the user's units and senses.
-    violations : dict
-        Scaled residual by constraint, and of bounds that are exceeded.
-    violation : float
-        The largest of them; infinite if the evaluation failed.
-    defect, max_defect, trajectory
-        Empty, 0 and None: there are no states.
-    """
-
-    objectives: Mapping[str, float]
-    violations: Mapping[str, float]
-    violation: float
+    objectives: Mapping[str, float]  # by name, in the user's units and senses
+    violations: Mapping[str, float]  # scaled residual by constraint, and of bounds that are exceeded
+    violation: float  # the largest of them; infinite if the evaluation failed
+    # defect, max_defect, trajectory: Empty, 0 and None: there are no states.
     defect: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     max_defect: float = 0.0
     trajectory: Any = None

@@ -63,21 +63,11 @@ def padded(rows: Sequence[np.ndarray | None], like: tuple[int, ...]) -> np.ndarr
 
 @dataclass(frozen=True, eq=False)
 class Decisions:
-    """n decision vectors as one table, a column for each variable that any of them has.
+    """n decision vectors as one table, a column for each variable that any of them has."""
 
-    Attributes
-    ----------
-    variables : tuple of Variable (D)
-        In the order of the first point, then those that only later ones have.
-    values : array (n, D)
-        NaN where a point has no such variable.
-    places : tuple of n int arrays
-        The columns that a point's own vector consists of, in its order.
-    """
-
-    variables: tuple[Variable, ...]
-    values: np.ndarray
-    places: tuple[np.ndarray, ...]
+    variables: tuple[Variable, ...]  # in the order of the first point, then those that only later ones have
+    values: np.ndarray  # (n, D): NaN where a point has no such variable
+    places: tuple[np.ndarray, ...]  # the columns that a point's own vector consists of, in its order
 
     @classmethod
     def of(cls, rows: Sequence[Any], variables: Sequence[Variable | Sequence[Variable]]) -> Decisions:

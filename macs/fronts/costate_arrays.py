@@ -63,16 +63,7 @@ def costate_table(states: Sequence[str], units: Sequence[str], time_unit: str, t
 
 
 def costate_columns(points: Sequence[PhaseCostates | None], nodes: int, names: tuple[Sequence[str], str]) -> dict[str, np.ndarray]:
-    """The costates of one phase, all points; empty if none has any.
-
-    Parameters
-    ----------
-    points : sequence of PhaseCostates or None
-    nodes : int
-        Most nodes of any trajectory.
-    names : pair
-        See `costate_names`.
-    """
+    """The costates of one phase, all points; empty if none has any."""
     known = [one for one in points if one is not None]
     if not known:
         return {}
@@ -94,23 +85,7 @@ def costate_columns(points: Sequence[PhaseCostates | None], nodes: int, names: t
 def read_costates(
     data: Labelled, phase: str, states: Sequence[str], names: tuple[Sequence[str], str], nodes: Sequence[int]
 ) -> list[PhaseCostates | None]:
-    """The costates of one phase, from `costate_columns`.
-
-    Parameters
-    ----------
-    data : Labelled
-    phase : str
-    states : sequence of str
-    names : pair
-        See `costate_names`.
-    nodes : sequence of int
-        Of each point's trajectory.
-
-    Raises
-    ------
-    ValueError
-        If only some of the arrays are there, or lengths or bases are none.
-    """
+    """The costates of one phase, from `costate_columns`."""
     wanted = [*names[0], names[1], *(name for name in costate_table((), (), "", ()) if name.startswith("costate_"))]
     missing = [name for name in wanted if name not in data.arrays]
     if missing:

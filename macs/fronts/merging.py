@@ -38,15 +38,8 @@ def best_rows(points: Points, miss: np.ndarray | float = 0.0) -> np.ndarray:
     """Rows (k,) of the points that belong to a front, in their order.
 
     Points that were not simulated are compared by their objectives. Verified points are compared among themselves, by their simulated
-    objectives. A point that is not verified never displaces one that is: it belongs to the front as long as no verified point, and no
-    other that is not, is as good.
-
-    Parameters
-    ----------
-    points : Points
-    miss : array (m,) or float
-        By how much the objectives of a verified point may be worse than those of one that is not, for it to be as good: a verified point
-        may miss its own by so much, so that nothing is known to be lost.
+    objectives. A point that is not verified never displaces one that is: it belongs to the front as long as no verified point, and no other
+    that is not, is as good. miss (m,).
     """
     good = np.flatnonzero(points.verified)
     good = good[nondominated(points.simulated_F[good])]

@@ -47,13 +47,7 @@ class Source:
         return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data), trusted=True, vector=vector)
 
     def check(self, problem: Problem | VectorProblem | AnyCompiled | str, whose: str) -> Any:
-        """`problem`, or the one that `problems.load` makes of its name, compiled.
-
-        Raises
-        ------
-        ValueError
-            If it is another problem than this source's; `whose` begins the message.
-        """
+        """`problem`, or the one that `problems.load` makes of its name, compiled."""
         compiled = (problems.load(problem) if isinstance(problem, str) else problem).compile()
         if compiled.fingerprint != self.fingerprint:
             one, other = f"'{self.name}' ({self.fingerprint[:8]})", f"'{compiled.name}' ({compiled.fingerprint[:8]})"
@@ -65,13 +59,7 @@ class Source:
         return compiled
 
     def load(self) -> Any:
-        """The Problem or VectorProblem from its address. This runs the code that the address names.
-
-        Raises
-        ------
-        ValueError
-            If there is no address, it may not be loaded, nothing is found there, or something else is.
-        """
+        """The Problem or VectorProblem from its address. This runs the code that the address names."""
         if not self.address:
             raise ValueError(
                 f"problem '{self.name}' was stated in a script, so it cannot be found by name: pass it, Front.load(path, problem=problem)"

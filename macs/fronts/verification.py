@@ -33,35 +33,16 @@ EQUAL = 1e-9
 
 @dataclass(frozen=True)
 class Check:
-    """Result for one point.
-
-    Attributes
-    ----------
-    point : int
-    mismatch : float
-        Largest scaled difference between stored and recomputed trajectories.
-    violation : float
-        Of the transcription, evaluated anew at the stored decision.
-    objectives : float
-        Largest difference between stored and recomputed objectives, relative to the larger of 1 and the objective.
-    defect : float
-        Largest defect of the independent integration.
-    simulated : float
-        Largest violation of the simulated trajectory.
-    missed : float
-        Largest difference between the stored and the simulated objectives, integrals and peaks included, in `objective_scales`.
-    reasons : tuple of str
-        Why the point fails; empty if it does not.
-    """
+    """Result for one point."""
 
     point: int
-    mismatch: float
-    violation: float
-    objectives: float
-    defect: float
-    simulated: float
-    missed: float
-    reasons: tuple[str, ...]
+    mismatch: float  # largest scaled difference between stored and recomputed trajectories
+    violation: float  # of the transcription, evaluated anew at the stored decision
+    objectives: float  # largest difference between stored and recomputed objectives, relative to the larger of 1 and the objective
+    defect: float  # largest defect of the independent integration
+    simulated: float  # largest violation of the simulated trajectory
+    missed: float  # largest difference between the stored and the simulated objectives, integrals and peaks included, in `objective_scales`
+    reasons: tuple[str, ...]  # why the point fails; empty if it does not
 
     @property
     def ok(self) -> bool:
@@ -78,30 +59,7 @@ def verify(
     method: str = "DOP853",
     transcription: Transcription | None = None,
 ) -> list[Check]:
-    """Check every point of a front. Those of a vector problem are evaluated again.
-
-    Parameters
-    ----------
-    front : Points
-        Of a problem that is known or can be loaded.
-    tolerance : float
-        Largest defect, violation and miss of a simulated trajectory that pass. The transcription's own violation is compared to the front's
-        tolerance.
-    rtol, atol, method
-        Of the integrator; see `Point.simulate`.
-    transcription : Transcription, optional
-        That of the front, if it is none of this project's.
-
-    Returns
-    -------
-    list of Check
-        One for each point.
-
-    Raises
-    ------
-    ValueError
-        If the front is of a black box, or its problem or transcription cannot be made again.
-    """
+    """Check every point of a front. Those of a vector problem are evaluated again."""
     stated = front.stated()
     if isinstance(stated, CompiledVectorProblem):
         return _verify_rows(front, stated, tolerance)

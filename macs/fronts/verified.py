@@ -36,14 +36,7 @@ MISSES, AGAIN = "simulated, ", "evaluated again, "
 
 
 class Simulations:
-    """Simulations of trajectories of one problem, as exact as `verified` needs them, each made once.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    tolerance : float
-        How much a point may miss.
-    """
+    """Simulations of trajectories of one problem, as exact as `verified` needs them, each made once."""
 
     def __init__(self, problem: CompiledProblem, tolerance: float) -> None:
         self.problem, self.tolerance = problem, tolerance
@@ -74,26 +67,7 @@ def verified(
 
     A point is verified if its simulated states differ from those of the transcription by at most `tolerance` at the ends of elements, in
     spans of their bounds, if the simulated trajectory and its controls violate no constraint by more, in `verified_scale`, and if no
-    simulated objective differs by more, in `objective_scales`.
-
-    Parameters
-    ----------
-    points : Points
-    tolerance : float or None
-        None: the points are returned as they are. So are those of a black box, whose function is not known any more, and those whose
-        simulation is not over soon after the work
-        was asked to end early (`transcription.stopping`).
-    scales : array (m,), optional
-        What counts as one in each objective; by default `objective_scales`.
-    remark : bool
-        Whether notes say, too, where dynamics are so unstable that no simulation can follow them, which takes further simulations.
-    simulations : Simulations, optional
-        Those that were made before, of this problem and for this tolerance.
-
-    Raises
-    ------
-    ValueError
-        If the tolerance is not positive, or the problem of the points cannot be found.
+    simulated objective differs by more, in `objective_scales`. scales (m,).
     """
     check_verify(tolerance)
     if tolerance is None or points.source is None:

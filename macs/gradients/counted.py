@@ -13,20 +13,12 @@ from ..pareto.archive import Archive
 
 @dataclass
 class PolishLog:
-    """Results of the first k solves of a polish, which can be continued with them.
-
-    Attributes
-    ----------
-    archive : Archive
-        The archive before the polish.
-    Z, F, violation, status : arrays (k, D), (k, m), (k,), (k,)
-        Results in the order of the solves; see `Evaluation`.
-    """
+    """Results of the first k solves of a polish, which can be continued with them."""
 
     SHAPES: ClassVar[dict[str, str]] = {"Z": "k D", "F": "k m", "violation": "k", "status": "k str"}
 
-    archive: Archive
-    Z: np.ndarray
+    archive: Archive  # the archive before the polish
+    Z: np.ndarray  # Z, F, violation, status: (k, D), (k, m), (k,), (k,): Results in the order of the solves; see `Evaluation`
     F: np.ndarray
     violation: np.ndarray
     status: np.ndarray
@@ -50,27 +42,7 @@ class PolishLog:
 
 
 class CountedSolves:
-    """Gradient solves up to a number. After a request to end early no more are made.
-
-    Parameters
-    ----------
-    evaluator : Evaluator
-    left : int
-        Largest number of solves.
-    log : PolishLog, optional
-        The solves in it are not made again; all further solves are added to it.
-    in_vain : array (k, 2 m), optional
-        Objectives of pairs of points: solves from the second did not improve the first, and need not be tried again.
-
-    Attributes
-    ----------
-    left : int
-        Number of solves that may still be made; 0 after a request to end early.
-    stopped : bool
-        Whether the work was asked to end while solves were left.
-    in_vain : array (k, 2 m) or None
-        With what the polish tried.
-    """
+    """Gradient solves up to a number. After a request to end early no more are made. in_vain (k, 2 m), in_vain (k, 2 m)."""
 
     def __init__(self, evaluator: Evaluator, left: int, log: PolishLog | None = None, in_vain: np.ndarray | None = None) -> None:
         self._evaluator, self._log = evaluator, log

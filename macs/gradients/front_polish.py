@@ -128,27 +128,8 @@ PART = 1e-4
 
 
 def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vectors of which those that are infeasible when simulated have been solved again with tightened limits.
-
-    Parameters
-    ----------
-    evaluator : Bilevel
-        Makes and counts the solves.
-    Z : array (k, D)
-        Feasible vectors.
-    ranges : array (m,)
-        Ranges of the objectives.
-    verify : float
-        Largest violation, in the constraints' scales, of a point that is feasible when simulated.
-
-    Returns
-    -------
-    Z : array (k, D)
-    feasible : array (k,) of bool
-        Whether each is feasible when simulated, in the end.
-    moved : array (k,) of bool
-        Whether each was solved again.
-    """
+    """Vectors of which those that are infeasible when simulated have been solved again with tightened limits. Z (k, D), ranges (m,) -> (k,
+    D), (k,), (k,)."""
     nlp, Z = evaluator.nlp, Z.copy()
     F = nlp.evaluate(Z)[0] if len(Z) else np.empty((0, len(ranges)))
     margins = np.zeros((len(Z), len(nlp.g_scale)))

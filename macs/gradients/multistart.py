@@ -35,22 +35,7 @@ TRIED = (8, 16)
 
 
 class GradientSolves:
-    """Gradient solves with one tolerance, which are counted.
-
-    Parameters
-    ----------
-    tolerance : float
-        Largest scaled residual of a feasible point.
-    max_iterations : int
-        Most iterations of IPOPT in one solve, all its strategies together.
-
-    Attributes
-    ----------
-    counts : Counts
-        Gradient solves, iterations, work, failures by status.
-    before : callable
-        Called before each solve.
-    """
+    """Gradient solves with one tolerance, which are counted."""
 
     def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
         self.tolerance, self.max_iterations = tolerance, max_iterations
@@ -95,34 +80,8 @@ class GradientSolves:
 
 
 class MultistartSolver:
-    """Solver of scalarised problems of one NLP, each from the best vector known for it and from other starts, see `starts`.
-
-    Parameters
-    ----------
-    nlp : NLP
-    given : array (k, n), optional
-        Vectors that are known at the beginning.
-    starts : int or None
-        Number of starts for each problem. None: one, and for the optimum of a single objective as many as pay, see `seek`.
-    rng : numpy.random.Generator
-        Generator of the starts that are drawn.
-    solves : GradientSolves
-        Makes and counts the solves.
-
-    Attributes
-    ----------
-    solves : GradientSolves
-    counts : Counts
-        Gradient solves, iterations, failures by status.
-    most : float
-        Number of starts that may be drawn in all before each problem gets no more than it needs; at first, there is no such limit.
-    unseen : float
-        Probability that another start would find another optimum below which there are enough, if all led to one; see `Census`.
-    census : dict of int to Census
-        What the starts for each single objective have found; those in it are not sought again.
-    closest : Solved or None
-        What violates least, where solves for feasibility from many starts have found nothing feasible; see `reached`.
-    """
+    """Solver of scalarised problems of one NLP, each from the best vector known for it and from other starts, see `starts`. given (k,
+    n)."""
 
     def __init__(
         self,

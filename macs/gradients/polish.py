@@ -45,32 +45,16 @@ def polish(
     """The archive with its points moved to the Pareto front by gradient solves, and spread along it evenly.
 
     1. With more than two objectives, the front is a surface: one solve goes to each of `limit` places spread over it. With a guide all
-       solves that are left go to places that it wants, and no further steps follow: an even spread would take most of them elsewhere.
-    2. One guarded solve from each point that no solve has found; the best point of each objective is first solved for the least value of
-       that objective.
-    3. Solves for each point from the positions of its neighbours, as long as this finds better points. With more than two objectives and
-       few solves, each from the point that is nearest to dominating it. Not where all starts are `alike`.
-    4. Points slide along the front to positions of less energy, and new points fill wide gaps and free places; where the middle of a gap
-       is too far, places nearer to its sides. The ends are then solved once more from their neighbours.
+    solves that are left go to places that it wants, and no further steps follow: an even spread would take most of them elsewhere. 2. One
+    guarded solve from each point that no solve has found; the best point of each objective is first solved for the least value of that
+    objective. 3. Solves for each point from the positions of its neighbours, as long as this finds better points. With more than two
+    objectives and few solves, each from the point that is nearest to dominating it. Not where all starts are `alike`. 4. Points slide along
+    the front to positions of less energy, and new points fill wide gaps and free places; where the middle of a gap is too far, places
+    nearer to its sides. The ends are then solved once more from their neighbours.
 
     If there are few solves, step 2 uses only some points, well spread, and leaves half of the solves for the other steps. The remaining
     points fill free places in the end, if they are not dominated. If the work is asked to end early, no solves are left, and the result is
     made of those before.
-
-    Parameters
-    ----------
-    archive : Archive
-    solves : CountedSolves
-    limit : int
-        Largest number of points.
-    exponent : float, optional
-        See `archive.pair_energies`.
-    guide : Guide, optional
-        How densely points are wanted. Default: evenly.
-    optima : Archive, optional
-        Points that gradient solves have found already: they need no solve, nor do points that are no better.
-    alike : bool
-        Whether solves from many starts have all led to the same optima: neighbours then find nothing better.
     """
     if not len(archive):
         return archive

@@ -46,32 +46,13 @@ SAME, ROUNDING = 1e-3, 1e-5
 
 
 class Starts:
-    """Starts of gradient solves of one NLP, later every second near the best vector that is known.
-
-    Parameters
-    ----------
-    nlp : NLP
-    rng : numpy.random.Generator
-    drawn : int
-        How many were drawn before.
-
-    Attributes
-    ----------
-    drawn : int
-        Number of starts so far.
-    """
+    """Starts of gradient solves of one NLP, later every second near the best vector that is known."""
 
     def __init__(self, nlp: NLP, rng: np.random.Generator, drawn: int = 0) -> None:
         self._nlp, self._rng, self.drawn = nlp, rng, drawn
 
     def draw(self, best: np.ndarray | None = None) -> np.ndarray:
-        """The next start, a full vector; `best` (n,) is the best that is known.
-
-        Returns
-        -------
-        array (1 or 2, n)
-            The start and, if its states were propagated, the same controls with the states of the guess.
-        """
+        """The next start, a full vector; `best` (n,) is the best that is known. Returns (1 or 2, n)."""
         nlp, rng = self._nlp, self._rng
         drawn, self.drawn = self.drawn, self.drawn + 1
         near = drawn >= FIRST and (drawn - FIRST) % EACH
@@ -103,18 +84,7 @@ class Starts:
 
 
 class Census:
-    """What solves of one problem from different starts have found: how many optima, and how often the best.
-
-    Parameters
-    ----------
-    unseen : float
-        Probability that another start would find another optimum below which there are enough, as long as all have led to one.
-
-    Attributes
-    ----------
-    starts : int
-        Number of solves.
-    """
+    """What solves of one problem from different starts have found: how many optima, and how often the best."""
 
     def __init__(self, unseen: float = UNSEEN) -> None:
         self._losses: list[float] = []

@@ -34,25 +34,13 @@ class Task:
 @dataclass
 class Surface:
     """Points on a surface, and the places that solves went to. Distances are in the plane across the diagonal, in units of the front
-    between its ends.
+    between its ends."""
 
-    Attributes
-    ----------
-    pool : Archive
-        The points, the last that was found first.
-    ideal, between : arrays (m,)
-        Least values of the ends, and their ranges.
-    known : array (k, m)
-        Places and points in the plane; the ends first.
-    solved : array (k, m)
-        Objectives of what solves converged to, and of the ends.
-    """
-
-    pool: Archive
-    ideal: np.ndarray
+    pool: Archive  # the points, the last that was found first
+    ideal: np.ndarray  # ideal, between: (m,): Least values of the ends, and their ranges
     between: np.ndarray
-    known: np.ndarray
-    solved: np.ndarray
+    known: np.ndarray  # (k, m): Places and points in the plane; the ends first
+    solved: np.ndarray  # (k, m): Objectives of what solves converged to, and of the ends
     lattice: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:

@@ -26,23 +26,7 @@ def check_points(points: int, m: int) -> None:
 
 
 def targets(ends: np.ndarray, ranges: np.ndarray, points: int, method: str) -> list[Task]:
-    """Scalarised problems whose solutions, with the ends, make a front of at most `points` points.
-
-    Parameters
-    ----------
-    ends : array (m, m)
-        Objectives, all minimised; row i is the end that is best in objective i.
-    ranges : array (m,)
-        Ranges of the objectives between the ends; 0 for one that is in conflict with no other.
-    points : int
-        Number of points, the ends included.
-    method : "pascoletti-serafini" or "epsilon"
-
-    Returns
-    -------
-    list of (reference (m,), weights (m,))
-        With two objectives in the order along the front. Empty if the objectives are not in conflict.
-    """
+    """Scalarised problems whose solutions, with the ends, make a front of at most `points` points. ends (m, m), ranges (m,)."""
     if np.count_nonzero(ranges) < 2:
         return []
     return (_from_simplex if method == "pascoletti-serafini" else _at_limits)(ends, ranges, points)
@@ -76,20 +60,8 @@ def _at_limits(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Task]:
 def moved_along(F: np.ndarray, old: np.ndarray, new: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where points of a front are solved from when it is solved again, and along which weights.
 
-    That is where they are, unless the ends of the front have moved; then it is the same place between these.
-
-    Parameters
-    ----------
-    F : array (k, m)
-        Objectives of the points, all minimised.
-    old, new : arrays (m, m)
-        Those of the ends before and now; without rows (0, m), or with one objective, nothing is known to have moved.
-    units : array (m,)
-        What counts as one in each objective.
-
-    Returns
-    -------
-    references (k, m), weights (m,)
+    That is where they are, unless the ends of the front have moved; then it is the same place between these. F (k, m), old, new (m, m),
+    units (m,).
     """
     if not len(old) or len(units) == 1 or np.abs((new - old) / units).max() <= MOVED:
         return F, units

@@ -16,15 +16,9 @@ from .multistart import GradientSolves
 
 
 class Task(ABC):
-    """A scalarised problem that can be solved on any mesh.
+    """A scalarised problem that can be solved on any mesh."""
 
-    Attributes
-    ----------
-    units : array (m,)
-        What counts as one in each objective.
-    """
-
-    units: np.ndarray
+    units: np.ndarray  # (m,): What counts as one in each objective
 
     @abstractmethod
     def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray) -> Solved:
@@ -81,19 +75,12 @@ CLOSE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class End(Task):
-    """The least value of one objective, and for that the least values of the others.
-
-    Parameters
-    ----------
-    objective : int
-    units : array (m,)
-    known : array (m,)
-        Objectives of the end on another mesh. Many points may have the least value of the one objective, such as its bound: one with the
-        others near these is preferred.
-    """
+    """The least value of one objective, and for that the least values of the others. units (m,)."""
 
     objective: int
     units: np.ndarray
+    # (m,): Objectives of the end on another mesh. Many points may have the least value of the one objective, such as its bound: one with
+    # the others near these is preferred.
     known: np.ndarray
 
     def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray) -> Solved:

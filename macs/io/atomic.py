@@ -17,13 +17,7 @@ from uuid import uuid4
 
 
 def read_whole(path: str | PathLike[str], limit: int) -> bytes:
-    """The content of an ordinary file.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read, or is a folder, device or pipe, or larger than `limit` bytes.
-    """
+    """The content of an ordinary file."""
     try:
         # Without O_NONBLOCK, opening a pipe would wait for its writer.
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
@@ -122,13 +116,7 @@ def sealed(content: bytes) -> bytes:
 
 
 def unsealed(data: bytes) -> bytes | None:
-    """The content without its seal; None if there is no mark in it.
-
-    Raises
-    ------
-    ValueError
-        If there is a mark, but content, length or checksum are not those that were written.
-    """
+    """The content without its seal; None if there is no mark in it."""
     if MARK not in data:
         return None
     content, seal = data[:-SIZE], data[-SIZE:]

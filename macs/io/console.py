@@ -29,16 +29,7 @@ _INSIDE: ContextVar[bool] = ContextVar("inside a display", default=False)
 
 
 class Display(AbstractContextManager, ABC):
-    """Display of the state of long work; a context manager.
-
-    Parameters
-    ----------
-    shown : bool, optional
-        False: nothing is written. None: shown on a terminal or in a notebook, once the work has taken `LONG`, unless it is a part of other
-        work that is shown.
-    stream : text stream, optional
-        Default: stderr.
-    """
+    """Display of the state of long work; a context manager."""
 
     transient = False
     """Whether the display is removed from a terminal at the end."""
@@ -142,17 +133,7 @@ class StatusLine(Display):
 
 
 class Steps(Display):
-    """Display of a known number of steps. Ctrl-C raises `Stopped` at the next step; a second Ctrl-C interrupts at once.
-
-    Parameters
-    ----------
-    title : str
-    total : int
-    stream : text stream, optional
-        Default: stderr.
-    at_once : bool
-        True: the first Ctrl-C interrupts at once, where nothing is gained by the end of a step.
-    """
+    """Display of a known number of steps. Ctrl-C raises `Stopped` at the next step; a second Ctrl-C interrupts at once."""
 
     transient = True
 

@@ -10,17 +10,7 @@ CELL = "padding:1px 8px;white-space:nowrap;text-align:"
 
 
 def html_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[bool], dim: Sequence[int] = ()) -> str:
-    """A table.
-
-    Parameters
-    ----------
-    headers : lines of cells
-    rows : n rows of cells
-    left : bool for each column
-        Whether it is aligned left instead of right.
-    dim : numbers of rows
-        Written in grey.
-    """
+    """A table."""
     sides = ["left" if flush else "right" for flush in left]
 
     def line(cells: Sequence[str], tag: str, style: str = "") -> str:
@@ -32,20 +22,7 @@ def html_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], 
 
 
 def html_block(title: str, table: str, notes: Sequence[str] = (), picture: bytes = b"", what: str = "") -> str:
-    """A title, a table, notes and a picture.
-
-    Parameters
-    ----------
-    title : str
-    table : str
-        HTML, see `html_table`.
-    notes : sequence of str
-        A paragraph each.
-    picture : bytes
-        A PNG; none if empty.
-    what : str
-        What the picture shows, for those who cannot see it.
-    """
+    """A title, a table, notes and a picture."""
     lines = "".join(f"<div>{escape(note)}</div>" for note in notes)
     image = ""
     if picture:

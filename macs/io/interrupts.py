@@ -18,13 +18,6 @@ class Interrupts(AbstractContextManager["Interrupts"]):
 
     In the main thread, the first Ctrl-C only sets `reason`; a second one interrupts at once, as usual. Work that is a part of other such
     work ends with it, and what interrupts the part interrupts the whole.
-
-    Parameters
-    ----------
-    time_limit : float, optional
-        Seconds in this process.
-    earlier : float
-        Seconds that the work has already taken in other processes.
     """
 
     def __init__(self, time_limit: float | None = None, earlier: float = 0.0) -> None:

@@ -45,13 +45,7 @@ def labelled(table: Mapping[str, Column], values: Mapping[str, np.ndarray], attr
 
 
 def checked(table: Mapping[str, Column], group: Group) -> Labelled:
-    """The arrays of a group, which are those of a table.
-
-    Raises
-    ------
-    ValueError
-        If one is missing, not in the table, or of another kind or shape.
-    """
+    """The arrays of a group, which are those of a table."""
     unknown = [name for name in group.arrays if name not in table]
     if unknown:
         raise ValueError(f"it has an array '{unknown[0]}', which is not known")

@@ -46,26 +46,11 @@ class Labels(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Labelled:
     """Arrays with named dimensions, as a group of a netCDF file has them: what files need of an xarray.Dataset, which takes a second or two
-    to import.
+    to import."""
 
-    Attributes
-    ----------
-    arrays : name -> array
-        Of numbers, or of str as objects. Labels of a dimension are the array of its name.
-    labels : name -> Labels
-        Of each array.
-    attrs : mapping
-        Texts, numbers and arrays of numbers.
-
-    Raises
-    ------
-    ValueError
-        If two arrays do not agree on the length of a dimension.
-    """
-
-    arrays: Mapping[str, np.ndarray]
-    labels: Mapping[str, Labels]
-    attrs: dict[str, Any] = field(default_factory=dict)
+    arrays: Mapping[str, np.ndarray]  # of numbers, or of str as objects. Labels of a dimension are the array of its name.
+    labels: Mapping[str, Labels]  # of each array
+    attrs: dict[str, Any] = field(default_factory=dict)  # texts, numbers and arrays of numbers
 
     def __post_init__(self) -> None:
         lengths: dict[str, int] = {}
@@ -172,22 +157,7 @@ def _fixed(text: str) -> np.ndarray:
 
 
 def from_bytes(content: bytes, older: bool = False) -> Group:
-    """The root of a file with all that is in it.
-
-    Parameters
-    ----------
-    content : bytes
-    older : bool
-        Whether attributes may be texts of variable length. `to_bytes` does not write them, as HDF5 allocates any length that they claim.
-
-    Raises
-    ------
-    ValueError
-        If it has what `to_bytes` does not write: links to other places, compressed or incomplete arrays, types other than `NUMBERS` and
-        texts, more values than bytes.
-    Exception
-        Of any class, from HDF5, if it is none of its files.
-    """
+    """The root of a file with all that is in it."""
     import h5py
 
     reader = _Reader(content, older)

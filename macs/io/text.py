@@ -14,15 +14,7 @@ RIGHT = str.rjust
 
 
 def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
-    """A text table with aligned columns and a rule under the headers.
-
-    Parameters
-    ----------
-    headers : lines of cells
-    rows : n rows of cells
-    left : bool for each column
-        Whether it is aligned left instead of right.
-    """
+    """A text table with aligned columns and a rule under the headers."""
     cells = [*headers, *rows]
     widths = [max(len(row[i]) for row in cells) for i in range(len(left))]
     lines = ["  ".join((LEFT if flush else RIGHT)(cell, w) for cell, w, flush in zip(row, widths, left, strict=True)) for row in cells]

@@ -16,23 +16,13 @@ from .volume import duels
 
 @dataclass(frozen=True, repr=False)
 class Archive:
-    """Evaluated points as columns. Those that `insert` returns are feasible, mutually non-dominated and different.
-
-    Attributes
-    ----------
-    Z : array (n, D)
-        Full vectors, in the user's units.
-    F : array (n, m)
-        Objectives, all minimised.
-    violation : array (n,)
-        Largest scaled residual of any constraint.
-    """
+    """Evaluated points as columns. Those that `insert` returns are feasible, mutually non-dominated and different."""
 
     SHAPES: ClassVar[dict[str, str]] = {"Z": "n D", "F": "n m", "violation": "n"}
 
-    Z: np.ndarray
-    F: np.ndarray
-    violation: np.ndarray
+    Z: np.ndarray  # (n, D): Full vectors, in the user's units
+    F: np.ndarray  # (n, m): Objectives, all minimised
+    violation: np.ndarray  # (n,): Largest scaled residual of any constraint
 
     @staticmethod
     def of(points: Any, rows: np.ndarray) -> Archive:
@@ -78,30 +68,7 @@ def insert(
     exponent: float | None = None,
     guide: Guide | None = None,
 ) -> Archive:
-    """The archive after points have been offered to it.
-
-    Parameters
-    ----------
-    archive : Archive
-    Z, F, violation : arrays (k, D), (k, m), (k,)
-        Offered points. Those that are infeasible, failed (NaN), or dominated by or equal to another one are refused.
-    limit : int
-        Largest number of points, at least m.
-    tolerance : float
-        A point with a violation of at most this is feasible.
-    exponent : float, optional
-        See `energy.pair_energies`. Unless it is given, where there are too many points: with three and more objectives those are left out
-        that are not `dominance.worthwhile`; with up to three, the others have `volume.duels` for the places of those of low energy, and
-        with more than three they are chosen by `niches.best_of_niches`.
-    guide : Guide, optional
-        See `energy.spread`, by which points are then chosen.
-
-    Returns
-    -------
-    Archive
-        Points of the old archive come first, in their order. The best value of each objective that was ever offered is in it; with more
-        than three objectives, one that is nearly as good, see `niches.TIE`.
-    """
+    """The archive after points have been offered to it. Z (k, D), F (k, m), violation (k,)."""
     offered = np.flatnonzero((violation <= tolerance) & np.isfinite(F).all(axis=1))
     if not offered.size:
         return archive

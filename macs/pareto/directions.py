@@ -25,21 +25,7 @@ def simplex_lattice(m: int, divisions: int) -> np.ndarray:
 
 
 def pool(m: int, size: int) -> np.ndarray:
-    """Unit directions, evenly spread over the positive orthant, the m orthogonal ones first.
-
-    Parameters
-    ----------
-    m : int
-        Number of objectives.
-    size : int
-        Number of directions: exact for m = 2; for m = 1 there is one. For m >= 3 they are those of the finest simplex lattice with at most
-        so many (and at least one division), and its centre.
-
-    Returns
-    -------
-    array (k, m)
-        Rows of Euclidean length 1, none negative, all different.
-    """
+    """Unit directions, evenly spread over the positive orthant, the m orthogonal ones first. Returns (k, m)."""
     if m == 1:
         return np.ones((1, 1))
     if m == 2:
@@ -70,14 +56,8 @@ def tchebycheff(F: np.ndarray, directions: np.ndarray, ideal: np.ndarray, nadir:
     """Values (...,) of the Tchebycheff scalarisation: the largest weighted objective among those with a weight (Miettinen 1999, section
     3.4).
 
-    A value below the ideal point is negative, so that a new best value of an objective is an improvement for its direction.
-
-    Parameters
-    ----------
-    F, directions : arrays (..., m)
-        Objectives and weights; leading axes broadcast.
-    ideal, nadir : arrays (m,)
-        Values that are scaled to 0 and 1.
+    A value below the ideal point is negative, so that a new best value of an objective is an improvement for its direction. F, directions
+    (..., m), ideal, nadir (m,).
     """
     weighted = directions * normalised(F, ideal, nadir)
     return np.where(directions > 0.0, weighted, -np.inf).max(axis=-1)
@@ -110,18 +90,7 @@ def divisions_below(m: int, count: int) -> int:
 
 
 def reference_directions(m: int, population: int | None, divisions: int | None) -> np.ndarray:
-    """Reference directions (k, m), rows that sum to 1, in lexicographic order.
-
-    Parameters
-    ----------
-    m : int
-        Number of objectives, at least 2.
-    population : int or None
-        Number of directions, at least m; not used if `divisions` are given. If no simplex lattice has so many, they are points of a finer
-        one with a low energy of all pairs, its corners among them.
-    divisions : int or None
-        Divisions of the simplex lattice (Das and Dennis 1998).
-    """
+    """Reference directions (k, m), rows that sum to 1, in lexicographic order."""
     return _lattice(m, population, divisions).copy()
 
 
@@ -152,17 +121,7 @@ def check_several(name: str, m: int) -> None:
 
 
 def check_directions(name: str, m: int, population: int | None, divisions: int | None) -> None:
-    """Raise ValueError if there are too few directions, or too few individuals for them.
-
-    Parameters
-    ----------
-    name : str
-        Name of the solver, for the message.
-    m : int
-        Number of objectives of the directions.
-    population, divisions : int or None
-        As the user gave them.
-    """
+    """Raise ValueError if there are too few directions, or too few individuals for them."""
     check_several(name, m)
     if population is None:
         return

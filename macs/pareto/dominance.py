@@ -52,16 +52,7 @@ def constrained_dominates(
     """Mask (...,): whether F dominates `others`, feasibility first (Deb 2000).
 
     A feasible point dominates any infeasible one. Of two infeasible points the one with less violation dominates. Two feasible points are
-    compared by their objectives.
-
-    Parameters
-    ----------
-    F, others : arrays (..., m)
-        Objectives; those of infeasible points are not used.
-    violation, other_violation : arrays (...,)
-        Infinite where the evaluation failed.
-    tolerance : float
-        A point with a violation of at most this is feasible.
+    compared by their objectives. F, others (..., m), violation, other_violation (...,).
     """
     feasible, other_feasible = violation <= tolerance, other_violation <= tolerance
     by_violation = ~other_feasible & (feasible | (violation < other_violation))

@@ -62,24 +62,7 @@ def spread(
 
     Free places are filled one at a time by the point that adds least energy. Then chosen points are exchanged for others, the best exchange
     first, as long as an exchange lowers the energy. So the energy is at most that of `members`, if these are `limit` points that include
-    the best of each objective; a best one that is missing is added at any cost.
-
-    Parameters
-    ----------
-    F : array (n, m)
-        Mutually non-dominated objectives.
-    limit : int
-        Number of points to choose, at least 1. If it is less than m, only the best points of the first objectives are kept.
-    members : array (n,) of bool, optional
-        Points to begin with, at most `limit`. Default: the best of each objective only.
-    exponent : float, optional
-        See `pair_energies`.
-    guide : Guide, optional
-        How densely points are wanted, and which are kept. Default: evenly.
-
-    Returns
-    -------
-    array (n,) of bool
+    the best of each objective; a best one that is missing is added at any cost. members (n,).
     """
     fixed = best_of_each(F, limit)
     for row in [] if guide is None else guide.anchors(F):

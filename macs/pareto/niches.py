@@ -27,17 +27,6 @@ def best_of_niches(F: np.ndarray, limit: int) -> np.ndarray:
     There are as many directions as points to choose. Each point belongs to the direction that it is nearest to, and is the better, the less
     its penalised distance from the ideal point (penalty-based boundary intersection). Directions without a point leave places to the second
     of others, and so on.
-
-    Parameters
-    ----------
-    F : array (n, m)
-        Mutually non-dominated objectives, at least two.
-    limit : int
-        Number of points to choose, at least m.
-
-    Returns
-    -------
-    array (n,) of bool
     """
     N = (F - F.min(axis=0)) / intercepts(F)
     axes = _unit_directions(F.shape[1], limit)

@@ -25,22 +25,8 @@ def duels(F: np.ndarray, chosen: np.ndarray, fixed: np.ndarray, energies: np.nda
     """Mask (n,) of as many of the points F (n, m) as are `chosen`: each of the others, in their order, has taken the place of the nearest
     chosen one if it is worth more there.
 
-    Worth is the volume that a point adds times its room: the distance of a single neighbour with the energy of all.
-
-    Parameters
-    ----------
-    F : array (n, m)
-        Mutually non-dominated objectives.
-    chosen, fixed : arrays (n,) of bool
-        Those that are chosen, and those of them that stay.
-    energies : array (n, n)
-        Of all pairs, see `energy.pair_energies`.
-    exponent : float
-        Power of the distance in them.
-
-    Returns
-    -------
-    array (n,) of bool
+    Worth is the volume that a point adds times its room: the distance of a single neighbour with the energy of all. chosen, fixed (n,),
+    energies (n, n).
     """
     rows = np.concatenate([np.flatnonzero(chosen & ~fixed), np.flatnonzero(chosen & fixed)])
     movable, others = np.count_nonzero(chosen & ~fixed), np.flatnonzero(~chosen)

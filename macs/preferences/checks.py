@@ -52,13 +52,7 @@ def names_of(values: Any, what: str) -> tuple[str, ...]:
 
 
 def places(names: Iterable[str], goals: Sequence[Objective]) -> dict[str, int]:
-    """The place of each of these objectives among the goals.
-
-    Raises
-    ------
-    ValueError
-        For a name that is none of the goals'.
-    """
+    """The place of each of these objectives among the goals."""
     known = [goal.name for goal in goals]
     for name in names:
         if name not in known:

@@ -162,14 +162,6 @@ def standing(stages: Sequence[Stage], points: Points, verify: float | None = Non
     them; 4: not feasible. A point beyond a hard limit is no choice, whatever confirms it; one within that is not confirmed is a doubtful
     choice. So a limit that is said to be hard is not given up for an error that is known. What a simulation contradicts is within the
     limits only if what was simulated is, too, but for `verify`.
-
-    Parameters
-    ----------
-    stages : sequence of Stage
-        Of which the hard limits are.
-    points : Points
-    verify : float, optional
-        By how much what was simulated may exceed a limit. Default: what the points were verified by.
     """
     sure, missed = confidence(points), verify or points.stats.get("verify") or VERIFY
     claimed, simulated = (

@@ -125,40 +125,20 @@ def _columns(objectives: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
 
 @dataclass(frozen=True, eq=False)
 class Ordering:
-    """Points in the order of a preference.
+    """Points in the order of a preference."""
 
-    Attributes
-    ----------
-    values : array (n, number of stages)
-        Of the stages: smaller is better, infinite where a hard limit is exceeded or an objective is not finite, NaN where a stage does not
-        follow (see `Stage.after_zero`).
-    excess : array (n,)
-        By how much the hard limits are exceeded, 0 where they are met.
-    order : array (n,) of int
-        Rows, best first.
-    """
-
+    # (n, number of stages): Of the stages: smaller is better, infinite where a hard limit is exceeded or an objective is not finite, NaN
+    # where a stage does not follow (see `Stage.after_zero`).
     values: np.ndarray
-    excess: np.ndarray
-    order: np.ndarray
+    excess: np.ndarray  # (n,): By how much the hard limits are exceeded, 0 where they are met
+    order: np.ndarray  # (n,): Rows, best first
 
 
 def ordering(
     stages: Sequence[Stage], objectives: np.ndarray, kind: np.ndarray, tie: np.ndarray | None = None, same: float = ATTAINED
 ) -> Ordering:
     """Points by their kind, then by the excess over hard limits, then by the stages, each as far as those before tell no difference.
-
-    Parameters
-    ----------
-    stages : sequence of Stage
-    objectives : array (n, m)
-    kind : array (n,)
-        What comes before all preference, as whether a point is feasible; less is better.
-    tie : array (n,), optional
-        What tells points apart whose values are equal; else they keep their places.
-    same : float
-        Values of all stages but the last count as equal if they differ by less than this part of their size, and of 1 at least.
-    """
+    objectives (n, m), kind (n,), tie (n,)."""
     columns: list[np.ndarray] = []
     for stage in stages:
         found = stage.numbers(objectives)

@@ -73,21 +73,12 @@ def named_targets(values: Any, what: str = "the target") -> dict[str, Target]:
 
 @dataclass(frozen=True)
 class Aim:
-    """A target of one objective, with what counts as one in missing it.
+    """A target of one objective, with what counts as one in missing it."""
 
-    Attributes
-    ----------
-    place : int
-        Of the objective among the goals.
-    sides : tuple of (slope, target)
-        Each slope * (J - target) is positive where the target is missed on this side; one side, or two for `Around`.
-    best : bool
-        Whether the target is the best value of the range, so that nothing is better.
-    """
-
-    place: int
+    place: int  # of the objective among the goals
+    # Each slope * (J - target) is positive where the target is missed on this side; one side, or two for `Around`.
     sides: tuple[tuple[float, float], ...]
-    best: bool = False
+    best: bool = False  # whether the target is the best value of the range, so that nothing is better
 
     def excesses(self, J: Sequence[Operand]) -> list[Operand]:
         """Excess over the target on each side; the largest of them and 0 is the deviation."""
@@ -111,15 +102,7 @@ def aims(
     tolerances: Mapping[str, float] | None = None,
     to_worst: bool = False,
 ) -> dict[str, Aim]:
-    """Aims by name, for targets that lie within the ranges.
-
-    Parameters
-    ----------
-    tolerances : dict, optional
-        What counts as one in missing a target.
-    to_worst : bool
-        Whether this is by default the distance of a target from the worst end of the range, instead of the width of the range.
-    """
+    """Aims by name, for targets that lie within the ranges."""
     found, spans = places(targets, goals), ranges.spans(goals)
     given = tolerances or {}
     result = {}

@@ -37,20 +37,6 @@ def filled(
     Solves lead first to where points are that are not verified, then to the middle of the widest gaps between verified ones. Each goes from
     there to the front along the ranges of the objectives (Pascoletti and Serafini 1984) and starts at the nearest verified points, on their
     meshes. As many of the points that are not verified are left out as the front has too many.
-
-    Parameters
-    ----------
-    points : Points
-    size : int
-    solves : GradientSolves
-        Makes and counts the solves.
-    most_work : float
-        Work of these solves, as `solves` counts it, after which no further one is made.
-    programs : Programs
-    simulations : Simulations
-        Of the points, too: what was simulated is not simulated again.
-    guide : Guide, optional
-        How densely points are wanted. Default: evenly.
     """
     tried = np.empty((0, points.F.shape[1]))
     while points.verified.any() and _needed(points).sum() < size and solves.counts.work < most_work and not stopping():

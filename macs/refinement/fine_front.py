@@ -35,17 +35,6 @@ def solved_on(
 
     The ends of the front are solved first, each for the least value of its own objective, then the points between them, from the nearest
     on. Nothing is simulated in between: a simulation of all takes less time than those of one after the other.
-
-    Parameters
-    ----------
-    points : Points
-        A whole front.
-    rows : sequence of int
-        Feasible points with trajectories.
-    fine : Meshed
-    programs : Programs
-    show : callable
-        Called with words on what is being done.
     """
     if not (rows and differentiable(points.compiled())):
         return points

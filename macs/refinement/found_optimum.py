@@ -45,27 +45,15 @@ CLEARLY, REFINED = 1e-3, 2
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """An optimum on a mesh that was found.
+    """An optimum on a mesh that was found."""
 
-    Attributes
-    ----------
-    nlp : NLP
-        Of its mesh.
-    solved : Solved
-        On the coarse mesh that it came from; where no solve converged, the least infeasible result.
-    refinement : Refinement or None
-        What became of it; None where no solve on a coarse mesh converged.
-    behind : float
-        By how much it is worse, in units, than what another one achieved when simulated; 0 if it is not.
-    starts, optima, times : int
-        Solves on its coarse mesh that converged, how many different optima these found, and how often that which it came from.
-    """
-
-    nlp: NLP
-    solved: Solved
-    refinement: Refinement | None
-    behind: float = 0.0
+    nlp: NLP  # of its mesh
+    solved: Solved  # on the coarse mesh that it came from; where no solve converged, the least infeasible result
+    refinement: Refinement | None  # what became of it; None where no solve on a coarse mesh converged
+    behind: float = 0.0  # by how much it is worse, in units, than what another one achieved when simulated; 0 if it is not
     exhausted: bool = False
+    # starts, optima, times: Solves on its coarse mesh that converged, how many different optima these found, and how often that which it
+    # came from.
     starts: int = 0
     optima: int = 0
     times: int = 0
@@ -107,29 +95,7 @@ def found_optimum(
     rng: np.random.Generator,
     coarse: Sequence[Meshed] = COARSE,
 ) -> Found:
-    """The optimum of a scalarised problem, from coarse meshes on.
-
-    Parameters
-    ----------
-    loop : MeshLoop
-        Has what is wanted, the limits, and makes and counts all solves.
-    reference, weights : arrays (m,)
-        See `scalarize`.
-    given : callable
-        Vectors (k, n) of an NLP that are known at the beginning; None if there are none.
-    starts : int or None
-        Number of starts on a coarse mesh: the best known vector, then others, see `gradients.starts`. None: as many as pay, as long as they
-        take little, on the first coarse mesh on which a solve converges; on another one, too, where not all led to the same good point.
-    rng : numpy.random.Generator
-        Of the starts that are drawn.
-    coarse : sequence of Meshed
-        The meshes to begin on. The next one is tried only where the one before leads to no good point.
-
-    Raises
-    ------
-    Stopped
-        If the work is to end before there is any result.
-    """
+    """The optimum of a scalarised problem, from coarse meshes on. reference, weights (m,)."""
     search = _Search(loop, reference, weights)
     for method in coarse:
         try:

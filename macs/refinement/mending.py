@@ -81,22 +81,7 @@ def solved_again(points: Points, verify: float) -> Points:
 
 
 class _Mending:
-    """One mending, whose steps share programs on meshes and simulations, each made once.
-
-    Parameters
-    ----------
-    points : Points
-        Of an optimal control problem.
-    verify : float
-        How much a point may miss.
-    show : callable
-        Called with words on what is being done.
-
-    Attributes
-    ----------
-    points : Points
-        As they came, simulated unless they are to be solved on another mesh anyway.
-    """
+    """One mending, whose steps share programs on meshes and simulations, each made once."""
 
     def __init__(self, points: Points, verify: float, show: Callable[[str], None]) -> None:
         problem = points.compiled()

@@ -53,19 +53,7 @@ DRIFT = 1e-2
 
 class Programs:
     """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes. Those that the problem keeps anyway,
-    since a search was made on them, are not made again.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    kept : int
-        How many are kept.
-
-    Attributes
-    ----------
-    built : int
-        Variables of all that were made.
-    """
+    since a search was made on them, are not made again."""
 
     def __init__(self, problem: CompiledProblem, kept: int = KEPT) -> None:
         self.problem, self.built, self._most = problem, 0, kept
@@ -85,35 +73,17 @@ class Programs:
 
 @dataclass(frozen=True, eq=False)
 class OnMesh:
-    """A point on one mesh, and its assessment.
-
-    Attributes
-    ----------
-    method : Meshed
-    z : array (n,)
-    F : array (m,)
-        Objectives, all minimised.
-    trajectory : Trajectory
-    verdict : Verdict
-    by_gradients : bool
-        True: a local optimum. False: a feasible point, or nothing is known.
-    achieved : array (m,) or None
-        The objectives of its simulation, all minimised, where that is feasible.
-    change : float
-        Largest change of an objective that matters from the mesh before, in units; infinite where there was none.
-    tried : bool
-        Whether elements were cut where other controls would gain, which changed next to nothing.
-    """
+    """A point on one mesh, and its assessment. z (n,)."""
 
     method: Meshed
     z: np.ndarray
-    F: np.ndarray
+    F: np.ndarray  # (m,): Objectives, all minimised
     trajectory: Trajectory
     verdict: Verdict
-    by_gradients: bool
-    achieved: np.ndarray | None
-    change: float = np.inf
-    tried: bool = False
+    by_gradients: bool  # true: a local optimum. False: a feasible point, or nothing is known.
+    achieved: np.ndarray | None  # (m,): The objectives of its simulation, all minimised, where that is feasible
+    change: float = np.inf  # largest change of an objective that matters from the mesh before, in units; infinite where there was none
+    tried: bool = False  # whether elements were cut where other controls would gain, which changed next to nothing
 
     @property
     def gaining(self) -> bool:
@@ -152,24 +122,12 @@ class Proposal:
 
 @dataclass(eq=False)
 class Refinement:
-    """What became of a point.
+    """What became of a point."""
 
-    Attributes
-    ----------
-    best : OnMesh
-        The point on the best of its meshes: good enough if any is, else that of the least error.
-    trouble : str
-        Reason why there were no finer meshes although it is not good enough.
-    worse : float
-        By how much it is worse, in units, than what a simulation of it on an earlier mesh achieved; 0 if it is not.
-    meshes : list of Meshed
-        Those on which it was solved.
-    """
-
-    best: OnMesh
-    trouble: str = ""
-    worse: float = 0.0
-    meshes: list[Meshed] = field(default_factory=list)
+    best: OnMesh  # the point on the best of its meshes: good enough if any is, else that of the least error
+    trouble: str = ""  # reason why there were no finer meshes although it is not good enough
+    worse: float = 0.0  # by how much it is worse, in units, than what a simulation of it on an earlier mesh achieved; 0 if it is not
+    meshes: list[Meshed] = field(default_factory=list)  # those on which it was solved
 
     def complaints(self) -> list[str]:
         """Reasons why the point is not good enough; empty if it is."""
@@ -189,25 +147,7 @@ class Refinement:
 
 
 class MeshLoop:
-    """Solves points on one mesh after another.
-
-    Parameters
-    ----------
-    programs : Programs
-    solves : GradientSolves
-        Makes and counts the solves.
-    wanted : Wanted
-    limit : int
-        Largest number of meshes for each point.
-    most_work : float, optional
-        Work of the gradient solves, as `solves` counts it, and of making their programs, after which no new mesh is begun.
-    knots : bool
-        Whether edges may move to the switches of controls, where meshes then suit one point alone.
-    enough : callable
-        Whether a point is good enough whatever else is wanted.
-    more : bool
-        Whether there may be more elements, or higher degrees. If not, those that there are move to where a trajectory bends.
-    """
+    """Solves points on one mesh after another."""
 
     def __init__(
         self,
@@ -262,19 +202,7 @@ class MeshLoop:
         return OnMesh(method, z, F, trajectory, verdict, by_gradients, achieved if feasible and np.isfinite(achieved).all() else None)
 
     def refine(self, begun: OnMesh, task: Task, others: Sequence[Trajectory] = (), hints: Sequence[Meshed] = ()) -> Refinement:
-        """A point on meshes that simulations agree with, as far as the limits allow.
-
-        Parameters
-        ----------
-        begun : OnMesh
-            Where it begins; its change is infinite if it is no optimum of `task` on its mesh.
-        task : Task
-            What it is the optimum of.
-        others : sequence of Trajectory
-            Of neighbouring points, as further starts.
-        hints : sequence of Meshed
-            Meshes that are tried first, one after the other.
-        """
+        """A point on meshes that simulations agree with, as far as the limits allow."""
         found = Refinement(begun)
         present, history, waiting, detours = begun, [begun.verdict.error], list(hints), DETOURS
         least = _achieved(begun, task)

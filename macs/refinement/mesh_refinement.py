@@ -71,28 +71,6 @@ class FrontRefinement:
 
     A point that is the best in an objective on its own mesh remains that. Points whose meshes are far too coarse begin on those of their
     nearest neighbour.
-
-    Parameters
-    ----------
-    front : Points
-    wanted : Wanted
-        How good points are to be, with objectives in ranges of the front.
-    limit : int
-        Largest number of meshes for each point.
-    chosen : sequence of int, optional
-        The points to be refined; default: all that converged.
-    most_work : float, optional
-        Work of gradient solves, see `Counts`, after which no new mesh is begun.
-    knots : bool
-        See `MeshLoop`.
-    programs : Programs, optional
-        The NLPs on meshes that others have solved on, too.
-    enough : callable
-        See `MeshLoop`.
-    max_iterations : int
-        Most iterations of one gradient solve.
-    more : bool
-        See `MeshLoop`.
     """
 
     def __init__(

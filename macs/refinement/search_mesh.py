@@ -46,30 +46,14 @@ def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
 
 @dataclass(frozen=True)
 class Chosen:
-    """Where a problem is solved for which no transcription is given.
+    """Where a problem is solved for which no transcription is given."""
 
-    Attributes
-    ----------
-    search : Transcription
-        For the candidates of a search: cheap.
-    fine : Meshed or None
-        A finer mesh, where one is needed for points that a simulation confirms.
-    counts : Counts
-        What it cost to find out.
-    ends : Points or None
-        The optima of single objectives on the coarse mesh, from which that was found out.
-    refined : Points or None
-        The same on meshes of their own.
-    census : dict of int to Census
-        What the starts for each single objective have found on the coarse mesh.
-    """
-
-    search: Transcription
-    fine: Meshed | None
-    counts: Counts
-    ends: Points | None = None
-    refined: Points | None = None
-    census: Mapping[int, Census] = field(default_factory=dict)
+    search: Transcription  # for the candidates of a search: cheap
+    fine: Meshed | None  # A finer mesh, where one is needed for points that a simulation confirms
+    counts: Counts  # what it cost to find out
+    ends: Points | None = None  # the optima of single objectives on the coarse mesh, from which that was found out
+    refined: Points | None = None  # the same on meshes of their own
+    census: Mapping[int, Census] = field(default_factory=dict)  # what the starts for each single objective have found on the coarse mesh
 
 
 def search_transcription(
@@ -90,16 +74,6 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
 
     Each objective is optimised, and for its best value the others, from the problem's guess and random starts, on a coarse mesh and then on
     finer ones, until a simulation agrees and a finer mesh changes nothing. The mesh has the elements of all these.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    verify : float
-        How much simulated points may miss.
-    tolerance : float
-        Largest scaled residual of a feasible point.
-    show : callable
-        Called with words on what is being done.
     """
     if not differentiable(problem):
         return Chosen(COARSE, None, Counts())

@@ -151,15 +151,8 @@ def no_credit(count: int) -> np.ndarray:
 
 
 def updated_credit(credit: np.ndarray, operator: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Credit of the operators (o, 2): number of offspring that stayed in the archive, and of all offspring; older ones count less.
-
-    Parameters
-    ----------
-    credit : array (o, 2)
-        Credit so far.
-    operator, kept : arrays (k,) of int and bool
-        Operator of each child, and whether the child stayed.
-    """
+    """Credit of the operators (o, 2): number of offspring that stayed in the archive, and of all offspring; older ones count less. credit
+    (o, 2), operator, kept (k,)."""
     tried = np.bincount(operator, minlength=len(credit))
     won = np.bincount(operator, weights=kept, minlength=len(credit))
     return (1.0 - FORGET) * credit + np.stack([won, tried], axis=1)
@@ -193,32 +186,7 @@ def breed(
     wide: float = WIDE,
     mutation: float = INDEX_MUTATION,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One offspring of each parent, and the operator that made it.
-
-    Parameters
-    ----------
-    box : Box
-    X : array (k, d)
-        The parents, in unit coordinates.
-    pool : array (p, d)
-        Points that mates are chosen from.
-    shares : array (number of operators,)
-        Probabilities of the operators.
-    rng : numpy.random.Generator
-    operators : sequence
-        `OPERATORS` or `OPERATORS_SURFACE`.
-    wide : float
-        See `mates`.
-    mutation : float
-        Its distribution index.
-
-    Returns
-    -------
-    array (k, d)
-        The offspring, inside the box.
-    array (k,) of int
-        Row in `operators` of the operator that made each.
-    """
+    """One offspring of each parent, and the operator that made it. X (k, d), pool (p, d), shares (number of operators,) -> (k, d), (k,)."""
     operator = rng.choice(len(operators), size=len(X), p=shares)
     others = mates(box, X, pool, rng, wide)
     trial = X.copy()

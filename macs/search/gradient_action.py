@@ -36,11 +36,6 @@ def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide:
     archive needs the ends of the front to be spread along it. After the first turn the ends are known, and with more than two objectives
     such an agent gets a random direction. With more than two objectives, all other solves start their line at the ideal point instead of
     the agent's objectives: a surface is too large to be covered from the positions of the agents alone.
-
-    Returns
-    -------
-    list of Evaluation
-        Points to be offered to the archive: one, or none.
     """
     agents, m = state.agents, state.directions.shape[1]
     turn, i = divmod(state.refinements, len(agents))

@@ -30,24 +30,7 @@ LEAST, FORGET = 0.05, 0.05
 
 
 def inertia(box: Box, X: np.ndarray, velocity: np.ndarray, rho: np.ndarray, shorten: bool, rng: np.random.Generator) -> np.ndarray:
-    """Proposals (k, d) along the velocity, by a random fraction of it.
-
-    Parameters
-    ----------
-    box : Box
-    X, velocity : arrays (k, d)
-    rho : array (k,)
-        Relative radius of each agent.
-    shorten : bool
-        True: the step is shortened until it stays in the box, as in the paper. False: its end is put back into the box, so that one
-        variable near a bound does not stop the others.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    array (k, d)
-        A row equals that of X if the velocity is zero or points out of the box.
-    """
+    """Proposals (k, d) along the velocity, by a random fraction of it. X, velocity (k, d), rho (k,)."""
     step = box.stop_outward(X, rho[:, None] * velocity)
     fraction = rng.random(len(X)) * (box.reach(X, step) if shorten else 1.0)
     return box.put_back(X + fraction[:, None] * step)
@@ -61,22 +44,8 @@ def coordinate_step(box: Box, X: np.ndarray, coordinate: np.ndarray, step: np.nd
 
 
 def differential(box: Box, X: np.ndarray, donors: np.ndarray, F: float, CR: float, rng: np.random.Generator) -> np.ndarray:
-    """Proposals (k, d) of differential evolution: from x along (x3 - x) + F (x1 - x2), in some of the coordinates, by a random fraction.
-
-    Parameters
-    ----------
-    box : Box
-    X : array (k, d)
-    donors : array (3, k, d)
-        x1, x2 and x3 for each agent: three different other agents (Storn and Price 1997).
-    F, CR : float
-        Weight of the difference; probability that a coordinate changes. At least one coordinate always does.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    array (k, d)
-    """
+    """Proposals (k, d) of differential evolution: from x along (x3 - x) + F (x1 - x2), in some of the coordinates, by a random fraction. X
+    (k, d), donors (3, k, d)."""
     first, second, third = donors
     step = box.difference(third, X) + F * box.difference(first, second)
     part = rng.random(X.shape) < CR
@@ -103,13 +72,7 @@ def distinct_others(agents: np.ndarray, population: int, count: int, rng: np.ran
 
 def lone_share(progress: np.ndarray) -> float:
     """Share of the lone agents in the evaluations of all agents: by what they gain in one, and what the others do, with a least share for
-    each.
-
-    Parameters
-    ----------
-    progress : array (2, 2)
-        See `SearchState.progress`.
-    """
+    each. progress (2, 2)."""
     gained, tried = progress.T
     rate = gained / np.maximum(tried, 1.0)
     part = rate[LONE] / rate.sum() if rate.any() else 0.5

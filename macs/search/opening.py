@@ -33,38 +33,7 @@ OTHER = 1e-3
 
 
 class Opening:
-    """The points with which a search begins.
-
-    Parameters
-    ----------
-    evaluator : Evaluator
-    Z : array (k, D)
-        The first population.
-    given : int
-        How many of these, the first ones, the user gave.
-    gradients : bool
-        Whether to find points of the front by gradient solves.
-    points : int
-        Most points in the archive.
-    budget : int
-        Evaluations, those of the first population included.
-    rng : numpy.random.Generator
-
-    Attributes
-    ----------
-    population : Evaluation
-        Of the first population, each point by what made it feasible, or came last.
-    evaluations : list of Evaluation
-        All evaluations of that population, one after the other.
-    optima : Evaluation
-        What gradient solves found.
-    several : bool
-        Whether solves from different starts ended in different optima.
-    alike : array (m,) of bool
-        Whether solves for an objective alone, from as many starts as are enough, all ended in the same optimum.
-    closest : Evaluation
-        What violates least, where solves for feasibility from many starts have found nothing feasible; else empty.
-    """
+    """The points with which a search begins. Z (k, D), alike (m,)."""
 
     def __init__(
         self, evaluator: Evaluator, Z: np.ndarray, given: int, gradients: bool, points: int, budget: int, rng: np.random.Generator
@@ -152,29 +121,7 @@ def anew(
     archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, alike: np.ndarray, rng: np.random.Generator
 ) -> tuple[Evaluation, bool]:
     """What `count` gradient solves from other starts find, for the ends of the front and points along it in turn; fewer if asked to end
-    early. Where starts led to several optima for some objectives only, other ends are not sought.
-
-    Parameters
-    ----------
-    archive : Archive
-        The front so far; about every second start is near one of its points.
-    evaluator : Bilevel
-    points : int
-        Most points in the archive.
-    count : int
-    drawn : int
-        How many such starts there have been before.
-    alike : array (m,) of bool
-        See `Opening`.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    Evaluation
-        Feasible points.
-    bool
-        Whether any is an optimum that is worse than what was known.
-    """
+    early. Where starts led to several optima for some objectives only, other ends are not sought. alike (m,)."""
     solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, _counted_by(evaluator))
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = archive.F[extremes(archive.F)]

@@ -25,30 +25,16 @@ class Region:
 
     The value is that of the first stage, see `Ranking.values`, and the spread is over the points that meet the preference's hard limits:
     those that exceed one lie outside. If all do, the value is by how much.
-
-    Attributes
-    ----------
-    stage : Stage
-    limited : bool
-        Whether a point of the front meets the hard limits.
-    best, spread : float
-        The best value on the front, and how much worse the worst is.
     """
 
     stage: Stage
-    limited: bool
-    best: float
+    limited: bool  # whether a point of the front meets the hard limits
+    best: float  # best, spread: The best value on the front, and how much worse the worst is
     spread: float
 
     @classmethod
     def of(cls, preference: Preference, goals: Sequence[Objective], objectives: np.ndarray) -> Self:
-        """The region on a front with objectives (n, m), all finite, in the user's units and senses; they are normalised by their ranges.
-
-        Raises
-        ------
-        ValueError
-            Where `Preference.stages` raises one.
-        """
+        """The region on a front with objectives (n, m), all finite, in the user's units and senses; they are normalised by their ranges."""
         stage = preference.stages(goals, Ranges.over(goals, objectives))[0]
         values = stage.numbers(objectives)
         met = np.isfinite(values)

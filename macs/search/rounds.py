@@ -122,27 +122,8 @@ def judged(
     ceiling: int,
     several: bool,
 ) -> Rounds:
-    """The rounds after one has ended: with the next one, or the reason why there is none.
-
-    Parameters
-    ----------
-    rounds : Rounds
-    found : array (k, m)
-        Objectives of the feasible points of this round that may belong to the front.
-    feasible : array (a, m)
-        Objectives of other feasible points, which only say what range is large.
-    violation : float
-        The least violation of all points; it counts as long as nothing is feasible.
-    directions : array (d, m)
-    evaluations, work : int
-        So far.
-    shortest, little : int, float
-        See `least`.
-    ceiling : int
-        Largest number of evaluations.
-    several : bool
-        Whether other starts have led to other optima; so has a later round that improved the front.
-    """
+    """The rounds after one has ended: with the next one, or the reason why there is none. found (k, m), feasible (a, m), directions (d,
+    m)."""
     seen = np.vstack([found, feasible])
     extent = np.fmax(rounds.extent, np.ptp(seen, axis=0)) if len(seen) else rounds.extent
     rounds = replace(rounds, finished=rounds.finished + 1, extent=extent)
@@ -173,17 +154,7 @@ def improves(found: np.ndarray, front: np.ndarray, extent: np.ndarray, direction
 
 
 def gains(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> tuple[float, float, float]:
-    """The gains by points with F (k, m) that lie beyond a front (n, m).
-
-    Returns
-    -------
-    float
-        The part of the hypervolume, of the front with them, that they add.
-    float
-        The improvement of the best values of the directions (d, m), on average, each of which counts one from the ideal point to the nadir.
-    float
-        The largest part of its range by which an objective gets a better best value.
-    """
+    """The gains by points with F (k, m) that lie beyond a front (n, m)."""
     ideal, span = _frame(np.vstack([front, found]), extent)
     new = found[beyond((found - ideal) / span, (front - ideal) / span) > BEYOND]
     if not len(new):

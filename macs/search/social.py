@@ -31,26 +31,8 @@ def nearest(box: Box, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray
 
 
 def current_to_rand(box: Box, X: np.ndarray, pool: np.ndarray, count: int, F: float, rng: np.random.Generator) -> np.ndarray:
-    """Proposals of DE/current-to-rand/1 with parents near each agent: y = x + K (p3 - x) + K F (p1 - p2), K uniform in (0, 1).
-
-    Parameters
-    ----------
-    box : Box
-    X : array (k, d)
-        Positions of the agents.
-    pool : array (p, d)
-        Points that the parents are drawn from.
-    count : int
-        The parents are drawn from so many nearest points of the pool.
-    F : float
-        Weight of the difference.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    array (k, d)
-        With only two parents the term of p3 is zero; with fewer the proposal is x.
-    """
+    """Proposals of DE/current-to-rand/1 with parents near each agent: y = x + K (p3 - x) + K F (p1 - p2), K uniform in (0, 1). X (k, d),
+    pool (p, d) -> (k, d)."""
     if not len(pool):
         return X.copy()
     rows = nearest(box, X, pool, count)
@@ -67,21 +49,9 @@ def current_to_rand(box: Box, X: np.ndarray, pool: np.ndarray, count: int, F: fl
 def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Proposals by random steps with the mean and the second moments of the displacements of past improvements.
 
-    A step that improved one point of a front often improves its neighbours too, and the longest such steps gained most. This samples from
-    a covariance estimated from successful steps (Hansen and Ostermeier 2001), without forming its matrix.
-
-    Parameters
-    ----------
-    box : Box
-    X : array (k, d)
-        Positions of the agents.
-    experience : array (e, d)
-        Displacements, e > 0.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    array (k, d)
+    A step that improved one point of a front often improves its neighbours too, and the longest such steps gained most. This samples from a
+    covariance estimated from successful steps (Hansen and Ostermeier 2001), without forming its matrix. X (k, d), experience (e, d) -> (k,
+    d).
     """
     count = len(experience)
     weights = rng.standard_normal((len(X), count)) / np.sqrt(count) + 1.0 / count
@@ -91,26 +61,13 @@ def follow_experience(box: Box, X: np.ndarray, experience: np.ndarray, rng: np.r
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Input of a social action; positions are in the unit box.
-
-    Attributes
-    ----------
-    box : Box
-    X : array (k, d)
-        Positions of the social agents.
-    population, archive : arrays (n, d), (a, d)
-        Positions of all agents, and of the points of the archive.
-    experience : array (e, d)
-        Displacements of the last improvements.
-    settings : Settings
-    rng : numpy.random.Generator
-    """
+    """Input of a social action; positions are in the unit box."""
 
     box: Box
-    X: np.ndarray
-    population: np.ndarray
+    X: np.ndarray  # (k, d): Positions of the social agents
+    population: np.ndarray  # population, archive: (n, d), (a, d): Positions of all agents, and of the points of the archive
     archive: np.ndarray
-    experience: np.ndarray
+    experience: np.ndarray  # (e, d): Displacements of the last improvements
     settings: Settings
     rng: np.random.Generator
 

@@ -24,37 +24,19 @@ NO_DIRECTION = -1
 
 @dataclass(repr=False)
 class Agents:
-    """Population of a search: n agents with their positions and velocities.
-
-    Attributes
-    ----------
-    Z : array (n, D)
-        Positions: full vectors, in the user's units.
-    F : array (n, m)
-        Objectives, all minimised; NaN where the evaluation failed.
-    violation : array (n,)
-        Largest scaled residual; infinite where the evaluation failed.
-    velocity : array (n, d)
-        Displacement of the free variables by the last successes, in units of span; zero for an agent at rest.
-    rho : array (n,)
-        Relative radius of the pattern search.
-    contractions : array (n,) of int
-        Number of contractions of the radius since it was last reset.
-    direction : array (n,) of int
-        Row, in the pool of directions, of the scalar sub-problem of the agent; -1 if it has none.
-    """
+    """Population of a search: n agents with their positions and velocities."""
 
     SHAPES: ClassVar[dict[str, str]] = {
         "Z": "n D", "F": "n m", "violation": "n", "velocity": "n d", "rho": "n", "contractions": "n int", "direction": "n int",
     }  # fmt: skip
 
-    Z: np.ndarray
-    F: np.ndarray
-    violation: np.ndarray
-    velocity: np.ndarray
-    rho: np.ndarray
-    contractions: np.ndarray
-    direction: np.ndarray
+    Z: np.ndarray  # (n, D): Positions: full vectors, in the user's units
+    F: np.ndarray  # (n, m): Objectives, all minimised; NaN where the evaluation failed
+    violation: np.ndarray  # (n,): Largest scaled residual; infinite where the evaluation failed
+    velocity: np.ndarray  # (n, d): Displacement of the free variables by the last successes, in units of span; zero for an agent at rest
+    rho: np.ndarray  # (n,): Relative radius of the pattern search
+    contractions: np.ndarray  # (n,): Number of contractions of the radius since it was last reset
+    direction: np.ndarray  # (n,): Row, in the pool of directions, of the scalar sub-problem of the agent; -1 if it has none
 
     def __len__(self) -> int:
         return len(self.Z)
@@ -67,21 +49,8 @@ class Agents:
         self.Z[rows], self.F[rows], self.violation[rows] = Z, F, violation
 
     def adapt_radius(self, rows: np.ndarray, success: np.ndarray, rho: float, contraction: float, limit: int) -> None:
-        """Contract the radius of agents without success, and expand that of agents with success; at either limit it is reset.
-
-        Parameters
-        ----------
-        rows : array of int
-            Those that acted.
-        success : array (n,) of bool
-            Of all.
-        rho : float
-            Initial radius, and the one after a reset.
-        contraction : float
-            Factor of a contraction; an expansion divides by it.
-        limit : int
-            Largest number of contractions. After one more, or an expansion beyond `rho`, the radius is reset.
-        """
+        """Contract the radius of agents without success, and expand that of agents with success; at either limit it is reset. success
+        (n,)."""
         self.contractions[rows] += np.where(success[rows], -1, 1)
         self.rho[rows] *= np.where(success[rows], 1.0 / contraction, contraction)
         anew = (self.contractions < 0) | (self.contractions > limit)

@@ -17,31 +17,8 @@ CREDIT = 0.5
 
 
 class Trials:
-    """Evaluates proposals within the budget, during one phase of an iteration, and records all results.
-
-    Parameters
-    ----------
-    settings : Settings
-    state : SearchState
-    evaluator : Evaluator
-    budget : int
-        Number of evaluations that the evaluator may have counted at the end.
-
-    Attributes
-    ----------
-    box : Box
-        Of the evaluator.
-    planned : int
-        Number of evaluations that settings follow from: the budget, unless this is only that of a round.
-    seen : list of Evaluation
-        All results.
-    credited : array (n,) of bool
-        Agents with a success that is due to their own step, not to the inner level that moved the candidate elsewhere.
-    gained : array (n,)
-        By how much each agent has improved by proposals that dominate it, in ranges of the front.
-    tried : array (n,) of int
-        Number of proposals of each agent that were evaluated.
-    """
+    """Evaluates proposals within the budget, during one phase of an iteration, and records all results. credited (n,), gained (n,), tried
+    (n,)."""
 
     def __init__(self, settings: Settings, state: SearchState, evaluator: Evaluator, budget: int) -> None:
         self.settings, self.state, self.evaluator, self.budget = settings, state, evaluator, budget
@@ -59,15 +36,8 @@ class Trials:
         return self.box.to_unit(Z[:, self.evaluator.free])
 
     def evaluate(self, Z: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
-        """Evaluate the proposals `trial` (k, d), made from full vectors Z (k, D) with unit coordinates X (k, d); no agent moves.
-
-        Returns
-        -------
-        array (j,) of int
-            Rows of the proposals that were evaluated: those that differ from X, as far as the budget allows.
-        Evaluation or None
-            Their results; None if j = 0.
-        """
+        """Evaluate the proposals `trial` (k, d), made from full vectors Z (k, D) with unit coordinates X (k, d); no agent moves. Returns
+        (j,)."""
         moved = np.flatnonzero((trial != X).any(axis=1))[: max(self.budget - self.state.evaluations, 0)]
         if not moved.size:
             return moved, None
@@ -83,12 +53,7 @@ class Trials:
         """Evaluate the proposals `trial` (k, d) of the agents `rows` at X (k, d), and move the agents with success.
 
         A success is dominance over the agent, or a better value for its direction. Velocities and experience use the displacements after
-        the inner level, not the proposed ones. Without `velocity`, an agent with success is left at rest.
-
-        Returns
-        -------
-        array (k,) of bool
-            Agents with success. A proposal equal to X, or beyond the budget, is not evaluated and is no success.
+        the inner level, not the proposed ones. Without `velocity`, an agent with success is left at rest. Returns (k,).
         """
         success = np.zeros(len(rows), dtype=bool)
         moved, result = self.evaluate(self.state.agents.Z[rows], X, trial)

@@ -41,13 +41,7 @@ def solver_class(name: str) -> type[Solver]:
 
 
 def solver(name: str, **settings: Any) -> Solver:
-    """A solver by name, with its settings; with `paper=True` those of its paper, where it has them (`MACS.paper`), but for those given.
-
-    Raises
-    ------
-    ValueError
-        If there is no such solver or setting, or a setting is outside its range.
-    """
+    """A solver by name, with its settings; with `paper=True` those of its paper, where it has them (`MACS.paper`), but for those given."""
     kind = solver_class(name)
     known = inspect.signature(kind).parameters
     paper = settings.pop(PAPER, False)

@@ -44,25 +44,13 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Kept:
-    """How a run stands between two iterations, beside the state of its solver.
-
-    Attributes
-    ----------
-    seed : int
-    counts : Counts
-    idle : int
-        Number of iterations since the last evaluation.
-    elapsed : float
-        Seconds of work so far.
-    stopped : str
-        Why the run ended by itself; empty as long as it has not.
-    """
+    """How a run stands between two iterations, beside the state of its solver."""
 
     seed: int
     counts: Counts
-    idle: int
-    elapsed: float
-    stopped: str = ""
+    idle: int  # number of iterations since the last evaluation
+    elapsed: float  # seconds of work so far
+    stopped: str = ""  # why the run ended by itself; empty as long as it has not
 
 
 class Unreadable(ValueError):  # noqa: N818 - the state of the file
@@ -74,28 +62,6 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 
     On leaving the context, what is not in the file yet is written. A write that fails does not stop the run: it is logged and tried again
     later, and `failure` gives the reason.
-
-    Parameters
-    ----------
-    path : path
-    solver : SearchMethod
-        The class of its state is the one that its `makes_state` is annotated to return.
-    belongs : mapping
-        Everything but the seed that decides the results of the run, as data.
-    sizes : mapping, optional
-        Dimensions of the run that are known: "m" objectives, "d" free variables, "D" entries of a full vector; see `shapes`.
-
-    Attributes
-    ----------
-    failure : str
-        Why the file is behind the run; empty if it is not.
-    mixed : bool
-        Whether other versions, of this package or of those that it computes with, had a part in the run.
-
-    Raises
-    ------
-    ValueError
-        If the class of the solver's state is not known.
     """
 
     def __init__(
@@ -115,14 +81,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         return len(self._versions) > 1
 
     def read(self, seed: int | None) -> tuple[Any, Kept] | None:
-        """The solver's state, and how the run of this seed (None: of any seed) stands; None if there is no file.
-
-        Raises
-        ------
-        Unreadable
-            If the file cannot be read, is no checkpoint, is damaged, or belongs to another run. The message names the field that is wrong
-            or differs.
-        """
+        """The solver's state, and how the run of this seed (None: of any seed) stands; None if there is no file."""
         try:
             return self._read(seed)
         except FileNotFoundError:

@@ -40,15 +40,7 @@ def to_bytes(document: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> b
 
 
 def read(path: str | PathLike[str]) -> tuple[Any, dict[str, np.ndarray]]:
-    """The document and the arrays of a file, checked against its checksum.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    ValueError
-        If it is no ordinary file, is no checkpoint of this version, is damaged, or does not contain what `to_bytes` writes.
-    """
+    """The document and the arrays of a file, checked against its checksum."""
     if not stat.S_ISREG(Path(path).stat().st_mode):
         raise ValueError("is no ordinary file")  # reading a device or a pipe may never end
     with Path(path).open("rb") as file:

@@ -43,20 +43,6 @@ def pack(value: Any, annotation: Any, arrays: dict[str, np.ndarray], where: str)
     Numbers are exact, infinities included, and a NaN remains one. Arrays are copied; the order of their axes in memory, on which sums
     depend, is kept. Generators keep the number of children they have spawned. Scalars of numpy become Python's. Two fields that are the
     same array or generator are packed twice, and come back as two.
-
-    Parameters
-    ----------
-    value, annotation
-        The annotation is a class, or what else may stand in the annotation of a field.
-    arrays : dict
-        The value's arrays are added to it, by path.
-    where : str
-        Path of the value.
-
-    Raises
-    ------
-    TypeError
-        If the value does not comply with its annotation, or this is of no type that can be packed. The message names the field.
     """
     kind = _kind(annotation, where)
     if value is None and kind.optional:
@@ -79,13 +65,7 @@ def pack(value: Any, annotation: Any, arrays: dict[str, np.ndarray], where: str)
 
 
 def unpack(tree: Any, annotation: Any, arrays: dict[str, np.ndarray], where: str) -> Any:
-    """The value whose tree and arrays `pack` made. Its arrays are taken out of `arrays`. `__init__` of a dataclass is not called.
-
-    Raises
-    ------
-    TypeError
-        If the tree is not that of such a value. The message names the field.
-    """
+    """The value whose tree and arrays `pack` made. Its arrays are taken out of `arrays`. `__init__` of a dataclass is not called."""
     kind = _kind(annotation, where)
     if tree is None and kind.optional:
         return None

@@ -31,34 +31,19 @@ ENDED = ("budget", "idle", "settled", "done", "ceiling")
 
 @dataclass
 class SearchRun:
-    """Run of a solver from a seed to a front.
-
-    Attributes
-    ----------
-    solver : SearchMethod
-    evaluator : Evaluator
-    goals : callable
-        Function that returns the objectives; called after the first evaluation, before which a black box may not know their number.
-    make_front : callable
-        (state, stats) -> Front; the state is None if the search was ended before its first population was evaluated.
-    budget : int or None
-        Largest number of evaluations. None: the search goes on in rounds until it is done, see `SearchMethod.searches_until_done`.
-    seed : int or None
-        None draws one.
-    start : array (k, D) or None
-        Full vectors to begin with.
-    what : mapping
-        Problem, solver and settings as data: a checkpoint belongs to these and to the fields above.
-    """
+    """Run of a solver from a seed to a front."""
 
     solver: SearchMethod
     evaluator: Evaluator
+    # Function that returns the objectives; called after the first evaluation, before which a black box may not know their number.
     goals: Callable[[], Sequence[Objective]]
+    # (state, stats) -> Front; the state is None if the search was ended before its first population was evaluated.
     make_front: Callable[[Any, dict[str, Any]], Front]
+    # Largest number of evaluations. None: the search goes on in rounds until it is done, see `SearchMethod.searches_until_done`.
     budget: int | None
-    seed: int | None
-    start: np.ndarray | None
-    what: Mapping[str, Any]
+    seed: int | None  # none draws one
+    start: np.ndarray | None  # (k, D): Full vectors to begin with
+    what: Mapping[str, Any]  # problem, solver and settings as data: a checkpoint belongs to these and to the fields above
 
     def go(
         self,
@@ -67,15 +52,7 @@ class SearchRun:
         callback: Callable[[Progress], Any] | None,
         checkpoint: str | PathLike[str] | None = None,
     ) -> Front:
-        """The front of the search, new or continued from its checkpoint, until the budget is spent or the search is stopped.
-
-        Returns
-        -------
-        Front
-            Its `stats["stopped"]` is the reason for the end of the run: "budget", "interrupted", "time limit", "callback", "settled" if the
-            method says so, or "idle" if nothing was left to evaluate. Without a budget it is "done" instead of "budget", or "ceiling" if
-            the largest number of evaluations came first.
-        """
+        """The front of the search, new or continued from its checkpoint, until the budget is spent or the search is stopped."""
         self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs(), self.evaluator.sizes)
         found = self._checkpoint.read(self.seed) if self._checkpoint else None
         kept = found[1] if found else Kept(secrets.randbits(63) if self.seed is None else int(self.seed), Counts(), 0, 0.0)

@@ -273,22 +273,13 @@ LONGEST = 80
 
 @dataclass(frozen=True)
 class Cell:
-    """The data that all runs of a cell share.
+    """The data that all runs of a cell share."""
 
-    Attributes
-    ----------
-    problem, transcription, solver : str
-        Labels, as the study names them; together they are the cell's name.
-    evaluations : int or None
-        Budget of each run; None: until the search is done.
-    details : mapping
-        Plain data that decide the runs' numbers: fingerprint and settings. Another study in the same folder differs in them.
-    """
-
-    problem: str
+    problem: str  # problem, transcription, solver: Labels, as the study names them; together they are the cell's name
     transcription: str
     solver: str
-    evaluations: int | None
+    evaluations: int | None  # budget of each run; None: until the search is done
+    # Plain data that decide the runs' numbers: fingerprint and settings. Another study in the same folder differs in them.
     details: Mapping[str, Any] = field(hash=False, repr=False)
 
     @property

@@ -16,17 +16,7 @@ SHOWN = 20
 
 
 class StudyDisplay(Display):
-    """The progress of a study, if it is shown: its current runs, and how many are left.
-
-    Parameters
-    ----------
-    title : str
-    runs, todo : sequences of StoredRun
-        All there are to be, and those to be made now.
-    shown : bool
-    stream : text stream, optional
-        stderr by default.
-    """
+    """The progress of a study, if it is shown: its current runs, and how many are left."""
 
     def __init__(self, title: str, runs: Sequence[StoredRun], todo: Sequence[StoredRun], shown: bool, stream: TextIO | None = None) -> None:
         super().__init__(shown, stream)

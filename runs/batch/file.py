@@ -32,22 +32,7 @@ def describe(name: str) -> str:
 
 
 def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> dict[str, Any]:
-    """The content of a study file, with the name of the file as its name unless it states one.
-
-    Parameters
-    ----------
-    source : path, or name of a study that comes with the project
-    keys : {key: bool}
-        The keys that the file may have, and whether each is required.
-    trust : bool
-        Whether addresses of code in it may be loaded that are not in the catalogue.
-
-    Raises
-    ------
-    ValueError
-        There is no such file, it is not TOML, or it has an unknown key, lacks a key, or has an address that
-        is not trusted; the message names it.
-    """
+    """The content of a study file, with the name of the file as its name unless it states one."""
     path = find(source)
     with errors_begin_with(str(source)):
         try:

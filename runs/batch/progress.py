@@ -39,41 +39,19 @@ class Goal(msgspec.Struct):
 
 
 class Progress(msgspec.Struct):
-    """How a study proceeds.
+    """How a study proceeds."""
 
-    Attributes
-    ----------
-    began : float
-        When this call of the study began, in seconds since 1970.
-    elapsed : float
-        Seconds since then.
-    left : float or None
-        Seconds that the rest takes, if it goes on like this; None if that is not known yet.
-    going : list of Going
-        The runs that are being made; runs on the workers of an executor are not known.
-    goals : {problem: list of Goal}
-        Objectives by label of the problem: no front has to be read to know them.
-    """
-
-    began: float
-    elapsed: float
-    left: float | None
-    going: list[Going]
-    goals: dict[str, list[Goal]] = {}
+    began: float  # when this call of the study began, in seconds since 1970
+    elapsed: float  # seconds since then
+    left: float | None  # seconds that the rest takes, if it goes on like this; None if that is not known yet
+    going: list[Going]  # the runs that are being made; runs on the workers of an executor are not known
+    goals: dict[str, list[Goal]] = {}  # objectives by label of the problem: no front has to be read to know them
 
 
 class ProgressFile(AbstractContextManager["ProgressFile"]):
     """The file of a study that is running; on leaving the context it is deleted.
 
     It is only there to be looked at, so a write that fails is no error.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the study.
-    goals : {problem: sequence of Objective}
-    going : callable
-        -> the runs that are being made, and the seconds left.
     """
 
     def __init__(

@@ -46,21 +46,7 @@ def execute(
     progress: bool,
 ) -> None:
     """Make the runs that a study's folder lacks, `count` of each cell. However this ends, the workers are stopped, and runs finished by
-    then are stored.
-
-    Parameters
-    ----------
-    store : Store
-    count : int
-    solvers : collection of str
-        Labels of those whose runs are made.
-    task_of : callable
-        (run, path of its checkpoint) -> the task that makes it.
-    goals : {problem: sequence of Objective}
-        By label.
-    jobs, executor, retry, progress
-        As for `Study.run`.
-    """
+    then are stored."""
     # The first run of every cell comes first: a study that is stopped early has results in all cells.
     every = sorted((run for run in store.runs(count) if run.cell.solver in solvers), key=lambda run: run.number)
     todo = [run for run in every if run.status in AGAIN or (retry and run.status == CRASHED)]

@@ -79,42 +79,22 @@ class RunRecord(msgspec.Struct):
 
 @dataclass(frozen=True)
 class StoredRun:
-    """One run of a cell, as the folder has it.
-
-    Attributes
-    ----------
-    cell : Cell
-    number : int
-        1, 2, ...
-    seed : int
-    status : str
-        "finished", "crashed", "timeout", "out of memory", "killed", "missing", or "unreadable": its front or its record is damaged.
-    message, traceback : str
-        Why it is not finished; of a finished one with an empty front, why that is empty.
-    wall_time : float
-        Seconds, of its process; 0 where nothing is known.
-    history : mapping
-        Of a finished run: "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" (a list of objectives, all minimised) at
-        about thirty counts, the last being its front's. Empty if its file is gone.
-    simulated : mapping
-        Of a finished run whose points were simulated: see `Outcome.simulated`.
-    path : Path
-        Of its front, whether it exists or not.
-    trust : bool
-        Whether its problem may be loaded from an address that is not in the catalogue.
-    """
+    """One run of a cell, as the folder has it."""
 
     cell: Cell
-    number: int
+    number: int  # 1, 2,
     seed: int
+    # "finished", "crashed", "timeout", "out of memory", "killed", "missing", or "unreadable": its front or its record is damaged.
     status: str
-    message: str
+    message: str  # message, traceback: Why it is not finished; of a finished one with an empty front, why that is empty
     traceback: str = field(repr=False)
-    wall_time: float
+    wall_time: float  # seconds, of its process; 0 where nothing is known
+    # Of a finished run: "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" (a list of objectives, all minimised) at
+    # about thirty counts, the last being its front's. Empty if its file is gone.
     history: Mapping[str, Any] = field(repr=False)
-    simulated: Mapping[str, Any] = field(repr=False)
-    path: Path
-    trust: bool = False
+    simulated: Mapping[str, Any] = field(repr=False)  # of a finished run whose points were simulated: see `Outcome.simulated`
+    path: Path  # of its front, whether it exists or not
+    trust: bool = False  # whether its problem may be loaded from an address that is not in the catalogue
 
     @property
     def finished(self) -> bool:
@@ -134,19 +114,11 @@ LEFT = [True] * 3 + [False] * 4
 
 @dataclass(frozen=True)
 class Summary:
-    """The state of a study.
-
-    Attributes
-    ----------
-    name : str
-    path : Path
-    runs : tuple of StoredRun
-        All that there are to be, cell by cell.
-    """
+    """The state of a study."""
 
     name: str
     path: Path
-    runs: tuple[StoredRun, ...] = field(repr=False)
+    runs: tuple[StoredRun, ...] = field(repr=False)  # all that there are to be, cell by cell
 
     def count(self, *statuses: str) -> int:
         """How many runs have one of the statuses."""
@@ -199,15 +171,7 @@ class Summary:
 
 
 class Store:
-    """A study's folder.
-
-    Attributes
-    ----------
-    path : Path
-    definition : dict
-        As of `Study.definition`: "name", "seed", "runs", "reference", "paper", and so on.
-    cells : tuple of Cell
-    """
+    """A study's folder."""
 
     def __init__(self, path: Path, definition: Mapping[str, Any], trust: bool = False) -> None:
         self.path = path
@@ -242,13 +206,6 @@ class Store:
         """The folder of this study, made if it does not exist, and locked within the context.
 
         Its record has the largest number of runs ever asked for.
-
-        Raises
-        ------
-        ValueError
-            It contains another study, or other files, or another process has locked it.
-        OSError
-            It cannot be written.
         """
         path = Path(out)
         cls._suits(path, definition)
@@ -384,15 +341,7 @@ def reason(status: str, message: str) -> str:
 
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """A context in which no other process has the lock on a file, which is made if it does not exist.
-
-    Raises
-    ------
-    ValueError
-        Another process has it; the message names the process.
-    OSError
-        The file cannot be made.
-    """
+    """A context in which no other process has the lock on a file, which is made if it does not exist."""
     lock, owner = FileLock(path), path.with_name(f"{path.name}.owner")
     try:
         lock.acquire(timeout=0)

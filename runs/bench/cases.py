@@ -26,33 +26,17 @@ Batch = tuple[np.ndarray, np.ndarray | None]
 
 @dataclass(frozen=True)
 class Case:
-    """Batches of candidates on one mesh.
-
-    Attributes
-    ----------
-    name : str
-    make : callable
-        () -> Problem.
-    mesh : DFET
-    warm : bool
-        Candidates near feasible points, starting from their states; else uniformly random ones, from a first guess.
-    tolerance : float
-    propagates : bool
-        Every candidate is feasible when it is propagated, within the bounds of states: propagation alone is an inner level here.
-    quick : bool
-        Also part of the quick benchmark.
-    asked : mapping
-        Target of "auto": "speed" at least, "moved" at most.
-    """
+    """Batches of candidates on one mesh."""
 
     name: str
-    make: Callable[[], Problem]
+    make: Callable[[], Problem]  # () -> Problem
     mesh: DFET
-    warm: bool = False
+    warm: bool = False  # candidates near feasible points, starting from their states; else uniformly random ones, from a first guess
     tolerance: float = 1e-6
+    # Every candidate is feasible when it is propagated, within the bounds of states: propagation alone is an inner level here.
     propagates: bool = False
-    quick: bool = True
-    asked: Mapping[str, float] = field(default_factory=dict)
+    quick: bool = True  # also part of the quick benchmark
+    asked: Mapping[str, float] = field(default_factory=dict)  # target of "auto": "speed" at least, "moved" at most
 
     def batch(self, nlp: NLP, rng: np.random.Generator) -> Batch:
         """A batch of candidates of the case, with a warm start if it has one."""

@@ -65,21 +65,12 @@ def table(rows: Sequence[Row], columns: Sequence[Column]) -> str:
 
 @dataclass(frozen=True)
 class Target:
-    """What a benchmark asks, and what it measured: by medians of rounds or seeds, so that neither the best nor the worst one decides.
+    """What a benchmark asks, and what it measured: by medians of rounds or seeds, so that neither the best nor the worst one decides."""
 
-    Attributes
-    ----------
-    what : str
-        Of which case, or of what.
-    asked, measured : str
-    met : bool
-        False, too, for what could not be measured.
-    """
-
-    what: str
+    what: str  # of which case, or of what
     asked: str
     measured: str
-    met: bool
+    met: bool  # false, too, for what could not be measured
 
 
 def verdicts(targets: Sequence[Target]) -> list[str]:

@@ -35,26 +35,14 @@ def sources(kind: str) -> list[Path]:
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured, as options of the command.
-
-    Attributes
-    ----------
-    quick : bool
-    seeds : int, optional
-        Number of seeds, for the benchmarks that have them: 1, 2, ..., or on plain functions spawned as those of studies.
-    jobs : int
-        Runs that are made at the same time, on plain functions.
-    keep : str, optional
-        Folder of the runs on plain functions: those that are in it are not made again.
-    solvers : tuple of str
-        Those that are compared on plain functions; all if there are none.
-    """
+    """How much is measured, as options of the command."""
 
     quick: bool = False
+    # Number of seeds, for the benchmarks that have them: 1, 2, ..., or on plain functions spawned as those of studies.
     seeds: int | None = None
-    jobs: int = 1
-    keep: str | None = None
-    solvers: tuple[str, ...] = ()
+    jobs: int = 1  # runs that are made at the same time, on plain functions
+    keep: str | None = None  # folder of the runs on plain functions: those that are in it are not made again
+    solvers: tuple[str, ...] = ()  # those that are compared on plain functions; all if there are none
 
     @property
     def words(self) -> list[str]:

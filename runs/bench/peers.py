@@ -32,27 +32,15 @@ ASKED = 1.5
 
 @dataclass(frozen=True)
 class Example:
-    """One problem in all programs.
-
-    Attributes
-    ----------
-    name : str
-    problem : callable
-        Ours.
-    word : str
-        The transcription of ours: so fine that the optimum is that of YAPSS, or the exact one, to six digits or as many as can be had.
-    module, setup : str
-        The example of YAPSS, and its function.
-    rockit : callable, optional
-        Its solution in rockit: the optimum.
-    """
+    """One problem in all programs."""
 
     name: str
-    problem: Callable[[], Problem]
+    problem: Callable[[], Problem]  # ours
+    # The transcription of ours: so fine that the optimum is that of YAPSS, or the exact one, to six digits or as many as can be had.
     word: str
-    module: str
+    module: str  # module, setup: The example of YAPSS, and its function
     setup: str = "setup"
-    rockit: Callable[[], float] | None = None
+    rockit: Callable[[], float] | None = None  # its solution in rockit: the optimum
 
 
 def goddard() -> Problem:

@@ -41,36 +41,17 @@ NARROWED = 2
 
 @dataclass(frozen=True)
 class Guided:
-    """A search to be guided.
-
-    Attributes
-    ----------
-    name : str
-    search : callable
-        (MACS, evaluations, seed) -> Front.
-    dense : callable
-        () -> points (k, m) of the true front, or what comes nearest to it, in the user's units and senses.
-    preference : Preference
-    evaluations : int
-    quick : bool
-        Whether it belongs to the quick benchmark.
-    archive : int
-        Points of the front.
-    refine : bool
-        Whether derivatives are used.
-    known : bool
-        Whether the front is known. If not, the points that are found belong to the dense front, too.
-    """
+    """A search to be guided."""
 
     name: str
-    search: Callable[[MACS, int, int], Front]
-    dense: Callable[[], np.ndarray]
+    search: Callable[[MACS, int, int], Front]  # (MACS, evaluations, seed) -> Front
+    dense: Callable[[], np.ndarray]  # () -> points (k, m) of the true front, or what comes nearest to it, in the user's units and senses
     preference: Preference
     evaluations: int
-    quick: bool = False
-    archive: int = 10
-    refine: bool = True
-    known: bool = True
+    quick: bool = False  # whether it belongs to the quick benchmark
+    archive: int = 10  # points of the front
+    refine: bool = True  # whether derivatives are used
+    known: bool = True  # whether the front is known. If not, the points that are found belong to the dense front, too.
 
 
 def zdt1(X: np.ndarray) -> np.ndarray:

@@ -25,25 +25,7 @@ FINEST, COARSEST = 41, 3
 
 
 def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list[dict[str, Any]]:
-    """The phases of a trajectory as plain data.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    costates : Costates, optional
-        Of the trajectory.
-    most : int
-        Largest number of samples of a curve. Polynomials are sampled on every element, so that jumps between elements stay. Of a curve with
-        more elements, the first, least, greatest and last sample of short pieces are kept, so that pulses stay.
-
-    Returns
-    -------
-    list of dict
-        Of each phase "name", "unit" (of time), "t0", "tf", "lasts" (False: it has no length, and no costates), "elements" (their
-        number), "times" and "quantities". A quantity has "name", "kind" ("state", "control", "path", "costate" or "hamiltonian"), "unit"
-        (of costates and the Hamiltonian what they are per, such as "per km"), "lower" and "upper" (None where there is no limit), "least"
-        (the least range that means anything), "t" (which of the "times") and "v" (values). Times and values are as `differences` has them.
-    """
+    """The phases of a trajectory as plain data."""
     found = []
     least = None if costates is None else costate_ranges(trajectory, costates)
     for phase in trajectory.phases:

@@ -36,20 +36,7 @@ LIVE_POLICY = "default-src 'none'; script-src 'self' 'unsafe-eval'; style-src 'u
 
 
 def page(data: Mapping[str, Any], blocks: Mapping[str, bytes]) -> bytes:
-    """A whole page.
-
-    Parameters
-    ----------
-    data : plain data
-        See `front_page` and `study_page`; "title" is that of the page.
-    blocks : {name: bytes}
-        Compressed by `packed`. Names are letters, digits and hyphens.
-
-    Raises
-    ------
-    ValueError
-        The drawing package is not installed.
-    """
+    """A whole page."""
     parts = [
         _head(str(data["title"]), POLICY),
         b'<script type="application/json" id="page">',

@@ -15,25 +15,7 @@ from .study_page import study_page
 
 
 def write_page(source: str | PathLike[str], out: str | PathLike[str], *, trust: bool = False, progress: bool = False) -> Path:
-    """Write the page of a front or a study to one file, whole.
-
-    Parameters
-    ----------
-    source : path
-        A front's file, or a study's folder.
-    out : path
-    trust : bool
-        Of a study: whether addresses in the folder's files may be loaded that are not in the catalogue: that runs the code they name.
-    progress : bool
-        Whether the terminal shows the progress.
-
-    Raises
-    ------
-    ValueError
-        The source is neither, or cannot be read; the study has no finished run; plotly is not installed.
-    OSError
-        The file cannot be written.
-    """
+    """Write the page of a front or a study to one file, whole."""
     plotly()
     check_target(out)
     content = study_page(Store.open(source, trust), progress) if Path(source).is_dir() else front_page(read_front(source))

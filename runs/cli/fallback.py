@@ -17,13 +17,6 @@ def saved(front: Front, out: Path) -> tuple[Path | None, str]:
 
     The disk may be full by now, or the folder gone or read-only. The next places are a new folder in the temporary folder, in the working
     folder and at home.
-
-    Returns
-    -------
-    place : Path or None
-        None: no place could be written to.
-    trouble : str
-        Empty if the front is in `out`.
     """
     try:
         front.save(out)

@@ -9,17 +9,7 @@ from problems.catalogue import is_catalogued
 
 
 def check_trusted(address: str, trust: bool, where: str) -> None:
-    """Raise ValueError if a file names an address that must not be loaded.
-
-    Parameters
-    ----------
-    address : str
-        As `problems.load` takes it. Without a colon it is a name, which runs no code but the catalogue's.
-    trust : bool
-        Whether the user trusts the file.
-    where : str
-        The file, for the message.
-    """
+    """Raise ValueError if a file names an address that must not be loaded."""
     if ":" in address and not trust and not is_catalogued(address):
         raise ValueError(
             f"{where} names '{address}', which is not in the catalogue and runs code of its own when loaded: "

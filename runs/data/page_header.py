@@ -29,32 +29,14 @@ NAMES = {"command": "made by", "digest": "digest", "version": "version", "date":
 class PageHeader:
     """The first lines of a page of measured results, a comment:
 
-    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md
-    digest: the SHA-256 of the files that state what is measured, see `digest`
-    version: 0.1.0+c194b98fc0ea
-    date: 2026-01-31 -->
-
-    Attributes
-    ----------
-    command : str
-        That makes the page.
-    digest : str
-        Of the study file, or of the files of a bench. The page is out of date once theirs is another.
-    version : str
-        Of this package when the page was written, and the digest of its code, see `code`. Runs of a study may be of older code.
-    date : str
-        Year-month-day.
-
-    Raises
-    ------
-    ValueError
-        If an entry is empty, or has characters that could end its line or the comment.
+    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md digest: the SHA-256 of the files that state
+    what is measured, see `digest` version: 0.1.0+c194b98fc0ea date: 2026-01-31 -->
     """
 
-    command: str
-    digest: str
-    version: str
-    date: str
+    command: str  # that makes the page
+    digest: str  # of the study file, or of the files of a bench. The page is out of date once theirs is another.
+    version: str  # of this package when the page was written, and the digest of its code, see `code`. Runs of a study may be of older code.
+    date: str  # year-month-day
 
     def __post_init__(self) -> None:
         for name, word in NAMES.items():
@@ -102,14 +84,6 @@ def version() -> str:
 def standing(page: Path, files_of: Callable[[str], Sequence[Path]]) -> tuple[str, bool]:
     """The command of a page or what is wrong with it, and whether the page is as its command would make it now.
 
-    Parameters
-    ----------
-    page : Path
-    files_of : callable
-        From a command to the files that state what its page is of; raises ValueError if there is no such command.
-
-    Notes
-    -----
     Results of other code than there is now are no fault, and are marked as such.
     """
     try:

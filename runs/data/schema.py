@@ -56,22 +56,7 @@ class Section(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 
 def checked(value: Any, kind: Any, name: str = "it") -> Any:
-    """Plain data converted to a type.
-
-    Parameters
-    ----------
-    value : plain data
-        Numbers of numpy and arrays count as numbers and lists.
-    kind : type
-        A `Section`, one of the annotated types of this module, or any other type that msgspec converts to.
-    name : str
-        Of the value, for messages about the value as a whole.
-
-    Raises
-    ------
-    ValueError
-        The value does not fit; one line that names the key.
-    """
+    """Plain data converted to a type."""
     data = plain(value)
     try:
         return msgspec.convert(data, kind)

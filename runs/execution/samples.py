@@ -40,21 +40,7 @@ class History(TypedDict, total=False):
 
 
 class Samples:
-    """Samples of the archive at some counts, and reports of the progress at intervals.
-
-    Parameters
-    ----------
-    budget : int or None
-        Evaluations of the run; None: it ends when it is done.
-    report : callable, optional
-    path : Path, optional
-        A file in which they are stored. A resumed run replaces those after the count at which it begins.
-
-    Attributes
-    ----------
-    columns : dict
-        The columns of its `History`.
-    """
+    """Samples of the archive at some counts, and reports of the progress at intervals."""
 
     def __init__(self, budget: int | None, report: Report | None = None, path: Path | None = None) -> None:
         self._step, self._next, self._report, self._told, self._path = max(1, (budget or PLANNED) // NUMBER), 0, report, 0.0, path

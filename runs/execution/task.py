@@ -61,31 +61,17 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a run.
+    """The outcome of a run."""
 
-    Attributes
-    ----------
-    status : str
-        "finished", "crashed" (by an exception), "timeout", "out of memory" or "killed".
-    message, traceback : str
-        The reason why it is not finished, in one line and in full.
-    front : bytes
-        The content of its front's file, if it is finished.
-    wall_time : float
-        Seconds until its end.
-    history : dict
-        "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
-        minimised. The last sample is the front itself.
-    simulated : dict
-        If the points of the front were simulated: see `simulation_record.record`.
-    """
-
-    status: str
-    message: str = ""
+    status: str  # "finished", "crashed" (by an exception), "timeout", "out of memory" or "killed"
+    message: str = ""  # message, traceback: The reason why it is not finished, in one line and in full
     traceback: str = field(default="", repr=False)
-    front: bytes = field(default=b"", repr=False)
-    wall_time: float = 0.0
+    front: bytes = field(default=b"", repr=False)  # the content of its front's file, if it is finished
+    wall_time: float = 0.0  # seconds until its end
+    # "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
+    # minimised. The last sample is the front itself.
     history: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    # If the points of the front were simulated: see `simulation_record.record`.
     simulated: SimulationRecord = field(default_factory=SimulationRecord, repr=False)
 
 

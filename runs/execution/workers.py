@@ -68,18 +68,7 @@ PATIENCE = 5.0
 
 @contextmanager
 def cluster(address: str) -> Iterator[Executor]:
-    """The executor of a Dask cluster, open within the context.
-
-    Parameters
-    ----------
-    address : str
-        Of its scheduler, such as tcp://10.0.0.1:8786.
-
-    Raises
-    ------
-    ValueError
-        Dask is not installed, the address is wrong, or no scheduler answers there.
-    """
+    """The executor of a Dask cluster, open within the context."""
     try:
         from distributed import Client
     except ImportError as error:

@@ -18,22 +18,13 @@ from .indicators import Points, goals_of, minimised
 
 @dataclass(frozen=True, eq=False)
 class Attainment:
-    """The surfaces of n runs.
+    """The surfaces of n runs."""
 
-    Attributes
-    ----------
-    runs : int
-        How many, those with empty fronts included.
-    levels : k -> array (p, m)
-        The non-dominated corners of the surface that at least k runs attain, minimised, in the order of the first objective; k = 1, ..., n.
-        Empty where fewer than k runs have points.
-    signs : array (m,)
-        +1 or -1: times this, a corner is in the user's units and senses.
-    """
-
-    runs: int
+    runs: int  # how many, those with empty fronts included
+    # (p, m): The non-dominated corners of the surface that at least k runs attain, minimised, in the order of the first objective; k = 1,
+    # ..., n. Empty where fewer than k runs have points.
     levels: Mapping[int, np.ndarray]
-    signs: np.ndarray
+    signs: np.ndarray  # (m,): +1 or -1: times this, a corner is in the user's units and senses
 
     def of(self, k: int) -> np.ndarray:
         """Corners (p, m), in the user's units and senses, of the surface that at least k runs attain."""
@@ -58,19 +49,7 @@ class Attainment:
 
 
 def attainment(fronts: Sequence[Points]) -> Attainment:
-    """The attainment surfaces of several runs.
-
-    Parameters
-    ----------
-    fronts : n Fronts, or arrays (p, m) of objectives, one for each run
-        Of two or three objectives. Arrays beside a Front are in the user's units and senses; of arrays alone all columns are minimised.
-        Points that did not converge attain nothing.
-
-    Raises
-    ------
-    ValueError
-        If there is no run, none with a point, or they differ in objectives or have other than two or three.
-    """
+    """The attainment surfaces of several runs. fronts (p, m)."""
     goals = goals_of(fronts)
     rows = [minimised(front, goals, f"front {i}") for i, front in enumerate(fronts)]
     filled = [part for part in rows if part.size]
@@ -104,17 +83,7 @@ def _surfaces(filled: Sequence[np.ndarray], runs: int, m: int) -> dict[int, np.n
 
 
 def staircase(corners: np.ndarray, signs: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """The border (q, 2) of the region that the corners (p, 2) of a surface dominate, for drawing.
-
-    Parameters
-    ----------
-    corners : array (p, 2)
-        In the user's units and senses.
-    signs : array (2,)
-        As of the `Attainment`.
-    ends : array (2,)
-        Where the two open ends of the staircase go: values that are worse than all corners.
-    """
+    """The border (q, 2) of the region that the corners (p, 2) of a surface dominate, for drawing. signs (2,), ends (2,)."""
     F = corners * signs
     F = F[np.lexsort(F.T[::-1])]
     worst = np.asarray(ends) * signs

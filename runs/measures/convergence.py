@@ -28,21 +28,7 @@ def band(histories: Sequence[History], *, larger: bool = False, moments: int = 4
     """The band of several runs, each with samples of its own.
 
     A run keeps its last value until its next sample, and for good after its end. Before its first sample, and where its value is NaN or
-    infinite, it has failed, which is worse than any value.
-
-    Parameters
-    ----------
-    histories : n pairs of arrays (k,)
-        Runs may have different numbers of samples, at different moments.
-    larger : bool
-        Whether larger values are better.
-    moments : int
-        All moments of all runs are taken if they are no more than this; else this many, evenly among them.
-
-    Raises
-    ------
-    ValueError
-        If there is no run, or a run has no samples, other numbers of moments and values, or moments that go back.
+    infinite, it has failed, which is worse than any value. histories (k,).
     """
     runs = [(np.asarray(x, dtype=float), np.asarray(y, dtype=float)) for x, y in histories]
     if not runs:

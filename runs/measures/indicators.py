@@ -157,13 +157,8 @@ def hypervolume(front: Points, reference: Points, *, point: float = POINT, norma
 
 
 def hypervolume_at(front: Points, point: Sequence[float]) -> float:
-    """Volume that the front dominates, in the objectives' own units, up to a point (m,) in the users' units and senses. 0 if it is empty.
-
-    Raises
-    ------
-    ValueError
-        If the point has not as many numbers as there are objectives.
-    """
+    """Volume that the front dominates, in the objectives' own units, up to a point (m,) in the users' units and senses. 0 if it is
+    empty."""
     F = minimised(front, None)
     if isinstance(front, Front) and len(point) != len(front.goals):
         raise ValueError(f"point: {len(point)} numbers, but {len(front.goals)} objectives: {', '.join(front.names)}")
@@ -184,14 +179,7 @@ def normalised(F: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def minimised(points: Points, goals: Sequence[Objective] | None, name: str = "the front") -> np.ndarray:
-    """Minimised objectives (n, m): of a front those of its converged points, of an array in the senses of `goals`, if any.
-
-    Raises
-    ------
-    ValueError
-        For an array that is not (n, m), has another number of objectives than `goals`, or has NaN or infinite values; for a front whose
-        objectives have other names, units or senses, or another order.
-    """
+    """Minimised objectives (n, m): of a front those of its converged points, of an array in the senses of `goals`, if any."""
     if isinstance(points, Front):
         if goals is not None and described(points.goals) != described(goals):
             raise ValueError(f"{name} has other objectives: {described(points.goals)}, not {described(goals)}")

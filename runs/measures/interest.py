@@ -18,33 +18,16 @@ from .indicators import Points, extent, minimised, truth
 
 @dataclass(frozen=True, eq=False)
 class Interest:
-    """Region of interest on a dense front, by which other fronts are measured.
+    """Region of interest on a dense front, by which other fronts are measured."""
 
-    Attributes
-    ----------
-    region : Region
-        By the values of the preference on the dense front, which is normalised by its own ranges.
-    goals : tuple of m Objectives
-    points : array (k, m)
-        Those of the dense front in the region, minimised.
-    part : float
-        Which part they are of the dense front's points.
-    """
-
-    region: Region
+    region: Region  # by the values of the preference on the dense front, which is normalised by its own ranges
     goals: tuple[Objective, ...]
-    points: np.ndarray
-    part: float
+    points: np.ndarray  # (k, m): Those of the dense front in the region, minimised
+    part: float  # which part they are of the dense front's points
 
     @classmethod
     def of(cls, preference: Preference, goals: Sequence[Objective], dense: Points) -> Self:
-        """The region on a dense front: a Front, or an array (n, m) in the user's units and senses.
-
-        Raises
-        ------
-        ValueError
-            If the points in the region dominate no volume up to their nadir: too few of them are there to measure by.
-        """
+        """The region on a dense front: a Front, or an array (n, m) in the user's units and senses."""
         R = truth(dense, goals)
         signs = np.array([goal.sign for goal in goals])
         region = Region.of(preference, goals, R * signs)

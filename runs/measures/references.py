@@ -42,23 +42,7 @@ LARGEST = 2**28
 
 
 def union(fronts: Sequence[Points]) -> Points:
-    """The non-dominated points of several fronts: the reference of a problem whose true front is not known.
-
-    Parameters
-    ----------
-    fronts : Fronts of one problem, arrays (n, m) of objectives, or both
-        Arrays beside a Front are in the user's units and senses; among arrays alone all columns are minimised. Empty ones add nothing.
-
-    Returns
-    -------
-    Front or array
-        Of Fronts, `Front.merge`: its points keep their trajectories. Of both, a Front of objectives alone. Of arrays, an array.
-
-    Raises
-    ------
-    ValueError
-        If there is none, if they differ in problem or objectives, or if an array has NaN or infinite values.
-    """
+    """The non-dominated points of several fronts: the reference of a problem whose true front is not known. fronts (n, m)."""
     if not len(fronts):
         raise ValueError("there is no front to take the union of")
     goals = goals_of(fronts)
@@ -98,16 +82,6 @@ def module_of(case: str) -> ModuleType:
     - `plot(flights) -> {name: Figure}`: its own figures of objects with a `trajectory`;
     - `dispersed(front, settings)`: what becomes of each point of a front under dispersions, `{way to fly: outcome}`, the nominal case
       first, where an outcome has `measures() -> {(name, unit): value}`; and `Dispersions`, the dataclass of the settings.
-
-    Parameters
-    ----------
-    case : str
-        A name of the catalogue, or "package.module:function".
-
-    Raises
-    ------
-    ValueError
-        If there is no such case.
     """
     place = (CASES[case][0] if case in CASES else case).rpartition(":")[0]
     try:
@@ -139,23 +113,7 @@ def called(case: str) -> tuple[str, bool]:
 
 
 def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
-    """A front from a file: a saved one (.nc), or a table of objectives (.csv), such as `Front.to_csv` or another program writes.
-
-    Parameters
-    ----------
-    path : path
-    goals : m Objectives
-        Of the problem that the table is of. Its columns are found by their headers, "flight time [s]" or "flight time"; without a header
-        the first m columns are the objectives in their order. Rows whose column "status" is not converged are left out.
-        Values are in the user's units and senses. Not needed for .nc.
-
-    Raises
-    ------
-    ValueError
-        If the file is no such table, has not the objectives, or has an entry that is not a finite number.
-    FileNotFoundError
-        If there is no such file.
-    """
+    """A front from a file: a saved one (.nc), or a table of objectives (.csv), such as `Front.to_csv` or another program writes."""
     if Path(path).suffix.lower() == ".nc":
         front = Front.load(path)
         if goals and front.goals != tuple(goals):
@@ -214,43 +172,15 @@ def _is_number(cell: str) -> bool:
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference front.
-
-    Attributes
-    ----------
-    front : Front
-    what : str
-        In words: "the true front, in closed form".
-    true : bool
-        Whether it is the truth, or only the best that is known.
-    """
+    """A reference front."""
 
     front: Front
-    what: str
-    true: bool
+    what: str  # in words: "the true front, in closed form"
+    true: bool  # whether it is the truth, or only the best that is known
 
 
 def look_up(given: Any, label: str, address: str, data: Mapping[str, Any], goals: Sequence[Objective]) -> Reference | None:
-    """The reference of a problem.
-
-    Parameters
-    ----------
-    given : None, str, or mapping
-        "union"; "truth" or the address of a case with a known front; a file; or {label of a problem: one of these}. None: the truth where
-        it is known, else the union.
-    label, address, data, goals
-        Of the problem.
-
-    Returns
-    -------
-    Reference or None
-        None: the union of all runs.
-
-    Raises
-    ------
-    ValueError, OSError
-        If there is no such reference, or it cannot be read.
-    """
+    """The reference of a problem."""
     if isinstance(given, Mapping):
         given = given.get(label)
     if given == "union":

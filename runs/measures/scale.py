@@ -14,45 +14,19 @@ from .indicators import POINT, Points, extent, goals_of, pieces, truth
 
 @dataclass(frozen=True)
 class Scale:
-    """The normalisation of a reference, in the user's units and senses.
+    """The normalisation of a reference, in the user's units and senses."""
 
-    Attributes
-    ----------
-    ideal, nadir : tuple of m floats
-        Best and worst value of each objective on the reference, dominated points left out.
-    corner : tuple of m floats
-        The reference point of the hypervolume.
-    goals : tuple of m Objectives
-    what : str
-        Name of the reference: "the closed form", "the union of 60 runs".
-    count : int
-        How many points it has.
-    curve : bool
-        Whether the points of the reference are taken as the curve through them; see `runs.measures.indicators.gd`.
-    """
-
-    ideal: tuple[float, ...]
+    ideal: tuple[float, ...]  # ideal, nadir: Best and worst value of each objective on the reference, dominated points left out
     nadir: tuple[float, ...]
-    corner: tuple[float, ...]
+    corner: tuple[float, ...]  # the reference point of the hypervolume
     goals: tuple[Objective, ...]
-    what: str
-    count: int
-    curve: bool = False
+    what: str  # name of the reference: "the closed form", "the union of 60 runs"
+    count: int  # how many points it has
+    curve: bool = False  # whether the points of the reference are taken as the curve through them; see `runs.measures.indicators.gd`
 
     @staticmethod
     def of(reference: Points, *, goals: Sequence[Objective] | None = None, what: str = "the reference", curve: bool = True) -> Scale:
-        """The normalisation by a reference that the indicators of `runs.measures.indicators` use.
-
-        Parameters
-        ----------
-        reference : Front or array (k, m)
-        goals : m Objectives, optional
-            Names, units and senses where the reference is an array. Without them all columns are minimised.
-        what : str
-            Name of the reference, for captions.
-        curve : bool
-            As the indicators were given it.
-        """
+        """The normalisation by a reference that the indicators of `runs.measures.indicators` use. reference (k, m)."""
         goals = goals_of([reference]) or goals
         R = truth(reference, goals)
         goals = goals or [Objective(f"objective {i + 1}") for i in range(R.shape[1])]

@@ -22,56 +22,33 @@ ALPHA = 0.05
 
 @dataclass(frozen=True)
 class Summary:
-    """A sample in numbers.
+    """A sample in numbers."""
 
-    Attributes
-    ----------
-    count, failures : int
-        Runs, and how many of them failed.
-    mean, variance : float
-        Of the runs that did not fail; variance with divisor n - 1. NaN where there are too few.
-    median, lower, upper : float
-        Median and quartiles (linear between values) of all runs, failed ones last: infinite where a failed one stands there.
-    best, worst : float
-        The worst is infinite if any run failed.
-    """
-
-    count: int
+    count: int  # count, failures: Runs, and how many of them failed
     failures: int
-    mean: float
+    mean: float  # mean, variance: Of the runs that did not fail; variance with divisor n - 1. NaN where there are too few.
     variance: float
+    # median, lower, upper: Median and quartiles (linear between values) of all runs, failed ones last: infinite where a failed one stands
+    # there.
     median: float
     lower: float
     upper: float
-    best: float
+    best: float  # best, worst: The worst is infinite if any run failed
     worst: float
 
 
 @dataclass(frozen=True)
 class PairTest:
-    """Two solvers on one indicator.
-
-    Attributes
-    ----------
-    first, second : str
-    statistic, p, p_holm : float
-        Of the test, and p after Holm's correction for all pairs that were compared.
-    a12 : float
-        Probability that a run of the first is better than one of the second, a tie being half.
-    effect : str
-        "negligible", "small", "medium" or "large".
-    note : str
-        States that there are too few runs for any corrected p below 0.05; usually empty.
-    """
+    """Two solvers on one indicator."""
 
     first: str
     second: str
-    statistic: float
+    statistic: float  # statistic, p, p_holm: Of the test, and p after Holm's correction for all pairs that were compared
     p: float
     p_holm: float
-    a12: float
-    effect: str
-    note: str = ""
+    a12: float  # probability that a run of the first is better than one of the second, a tie being half
+    effect: str  # "negligible", "small", "medium" or "large"
+    note: str = ""  # states that there are too few runs for any corrected p below 0.05; usually empty
 
 
 @dataclass(frozen=True)
@@ -105,20 +82,6 @@ def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False) -> 
 def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: bool = False) -> list[PairTest]:
     """Mann-Whitney U tests of every pair of solvers, with Holm's correction and A12.
 
-    Parameters
-    ----------
-    samples : {name: values (n,)}
-        Of independent runs; n may differ.
-    larger : bool
-        Whether larger values are better.
-
-    Returns
-    -------
-    list of PairTest
-        In the order of the names. Of samples that are all alike, p is 1.
-
-    Notes
-    -----
     p is exact where scipy's "auto" makes it so, else the normal approximation with correction for ties.
     """
     from scipy.stats import mannwhitneyu, rankdata

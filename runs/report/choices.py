@@ -33,29 +33,15 @@ LEAST = 3
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """One choice of a run.
-
-    Attributes
-    ----------
-    solver, label : str
-    point : Point
-    objectives : array (m,)
-        As simulated where the point is verified, else as the transcription has them.
-    preference : Preference
-    ranges : Ranges
-        By which objectives were normalised.
-    steps : sequence of dict
-        Of the solves that led to it, see `macs.decisions.Step`.
-    message : str
-    """
+    """One choice of a run."""
 
     solver: str
     label: str
     point: Point
-    objectives: np.ndarray
+    objectives: np.ndarray  # (m,): As simulated where the point is verified, else as the transcription has them
     preference: Preference
-    ranges: Ranges
-    steps: Sequence[Mapping[str, Any]]
+    ranges: Ranges  # by which objectives were normalised
+    steps: Sequence[Mapping[str, Any]]  # of the solves that led to it, see `macs.decisions.Step`
     message: str
 
     def degrees(self, by: Preference | None = None, ranges: Ranges | None = None) -> np.ndarray:

@@ -33,19 +33,12 @@ class Counting:
     """The points of a run that count: all of them, or in a study that verifies those that are feasible when simulated.
 
     Their objectives are those of the simulation, so that it does not matter what the solver said of these.
-
-    Attributes
-    ----------
-    front : Front
-        The n points that count.
-    ends : Ends
-        Their states at the end of each phase.
-    claimed, verified, feasible : int
-        Number of points that the solver returned, of those verified, and of those feasible when simulated, dominated ones included.
     """
 
-    front: Front
-    ends: Ends
+    front: Front  # the n points that count
+    ends: Ends  # their states at the end of each phase
+    # claimed, verified, feasible: Number of points that the solver returned, of those verified, and of those feasible when simulated,
+    # dominated ones included.
     claimed: int
     verified: int
     feasible: int
@@ -77,37 +70,17 @@ class Counting:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """All runs on one problem and one transcription.
+    """All runs on one problem and one transcription."""
 
-    Attributes
-    ----------
-    problem, transcription : str
-        Labels.
-    runs : {solver: sequence of StoredRun}
-        Its finished runs.
-    fronts : {solver: sequence of Front}
-        The points of each finished run that count; also the given fronts of foreign solvers.
-    counting : {solver: sequence of Counting}
-        The same with the result of their verification.
-    failures : {solver: int}
-        How many of its runs failed.
-    left_out : {solver: int}
-        How many other runs have no front.
-    stated : None, str or mapping
-        The reference as the study states it.
-    verifies : bool
-        Whether only points that are feasible when simulated count.
-    """
-
-    problem: str
+    problem: str  # problem, transcription: Labels
     transcription: str
-    runs: Mapping[str, Sequence[StoredRun]]
-    fronts: Mapping[str, Sequence[Front]]
-    counting: Mapping[str, Sequence[Counting]]
-    failures: Mapping[str, int]
-    left_out: Mapping[str, int]
-    stated: Any = None
-    verifies: bool = False
+    runs: Mapping[str, Sequence[StoredRun]]  # its finished runs
+    fronts: Mapping[str, Sequence[Front]]  # the points of each finished run that count; also the given fronts of foreign solvers
+    counting: Mapping[str, Sequence[Counting]]  # the same with the result of their verification
+    failures: Mapping[str, int]  # how many of its runs failed
+    left_out: Mapping[str, int]  # how many other runs have no front
+    stated: Any = None  # the reference as the study states it
+    verifies: bool = False  # whether only points that are feasible when simulated count
 
     @cached_property
     def against(self) -> Reference:
@@ -185,19 +158,7 @@ def compared(store: Store) -> dict[tuple[str, str], dict[str, list[StoredRun]]]:
 
 
 def comparisons(store: Store, others: Mapping[str, Sequence[Front]]) -> list[Comparison]:
-    """The comparisons of a study that have a front.
-
-    Parameters
-    ----------
-    store : Store
-    others : {name: fronts}
-        Fronts of foreign solvers; each joins the comparisons whose objectives it has.
-
-    Raises
-    ------
-    ValueError
-        A run's points cannot be verified, see `Counting.of`.
-    """
+    """The comparisons of a study that have a front."""
     found = []
     for (problem, transcription), solvers in compared(store).items():
         finished = {solver: [run for run in runs if run.finished] for solver, runs in solvers.items()}

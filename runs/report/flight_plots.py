@@ -51,24 +51,7 @@ def representatives(front: Front, count: int = 4) -> list[int]:
 
 
 def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({}), solver: str = "", names: Sequence[str] = ()) -> Figure:
-    """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above.
-
-    Parameters
-    ----------
-    points : Points of one problem, of one to six
-        With trajectories.
-    laws : {name: as many flights, or None}
-        Flights to draw beside each point, dashed; quantities that a flight does not have are left out.
-    solver : str
-        For the legend.
-    names : sequence of str
-        Of the points, in place of their numbers.
-
-    Raises
-    ------
-    ValueError
-        If there is no point, or one has no trajectory.
-    """
+    """A column for each point, a row for each state and control over time; the point's number, from 1, and its objectives above."""
     from matplotlib.ticker import MaxNLocator
 
     flights = _flights(points, laws)
@@ -102,17 +85,7 @@ def flights_figure(points: Sequence[Point], *, laws: Laws = MappingProxyType({})
 
 
 def paths_figure(points: Sequence[Point], track: Track, *, laws: Laws = MappingProxyType({}), equal: bool = False) -> Figure:
-    """The paths of a few points in one picture: a quantity of the flight over another, a colour each.
-
-    Parameters
-    ----------
-    points, laws
-        As of `flights_figure`. A law that lacks a state or control of the track is not drawn.
-    track : callable
-        {name of a state or control: values} -> {label: values across, label: values up}.
-    equal : bool
-        Whether both axes have the same scale.
-    """
+    """The paths of a few points in one picture: a quantity of the flight over another, a colour each."""
     flights = _flights(points, laws)
     with style():
         figure = new_figure(COLUMN, 2.7)

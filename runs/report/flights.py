@@ -46,36 +46,18 @@ BETTER = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Flights:
-    """Representative trajectories of the front of one solver.
-
-    Attributes
-    ----------
-    comparison : Comparison
-    reference : Reference
-    solver : str
-        The first solver that found points; the front is that of all its runs together.
-    points : tuple of Point
-    many : sequence of Point
-        Up to a hundred of that front, for pictures of a population.
-    case : module or None
-        The module of the problem, see `references.module_of`.
-    laws : {name: flights}
-        One for each point, None where there is none.
-    ends : Front
-        The optimum of each objective alone, by gradients, on the same transcription unless it is unsuited to them; empty if there is none.
-    note : str
-        Why there are no ends; usually empty.
-    """
+    """Representative trajectories of the front of one solver."""
 
     comparison: Comparison
     reference: Reference
-    solver: str
+    solver: str  # the first solver that found points; the front is that of all its runs together
     points: tuple[Point, ...]
-    many: Sequence[Point]
-    case: ModuleType | None
-    laws: Mapping[str, Sequence[Law | None]]
+    many: Sequence[Point]  # up to a hundred of that front, for pictures of a population
+    case: ModuleType | None  # the module of the problem, see `references.module_of`
+    laws: Mapping[str, Sequence[Law | None]]  # one for each point, None where there is none
+    # The optimum of each objective alone, by gradients, on the same transcription unless it is unsuited to them; empty if there is none.
     ends: Front
-    note: str
+    note: str  # why there are no ends; usually empty
 
     @classmethod
     def of(cls, comparison: Comparison) -> Flights | None:
@@ -225,21 +207,11 @@ def _alone(points: Sequence[Point], ends: Front) -> list[Law | None]:
 
 @dataclass(frozen=True, eq=False)
 class Designs:
-    """The variables along the front of one solver on a vector problem.
+    """The variables along the front of one solver on a vector problem."""
 
-    Attributes
-    ----------
-    solver : str
-        The first solver that found points.
-    front : Front
-        That of all its runs together.
-    numbers : list of int
-        Of the points in the table.
-    """
-
-    solver: str
-    front: Front
-    numbers: Sequence[int]
+    solver: str  # the first solver that found points
+    front: Front  # that of all its runs together
+    numbers: Sequence[int]  # of the points in the table
 
     @classmethod
     def of(cls, comparison: Comparison) -> Designs | None:

@@ -36,25 +36,12 @@ Share = Annotated[float, Meta(gt=0, le=1, description="a number above 0 and at m
 
 
 class Goal(Section):
-    """The table `[goal]` of a study.
-
-    Attributes
-    ----------
-    objective : str
-    best, worst : float
-        Values of the objective, in the user's unit, with attainment 1 and 0.
-    shares : sequence of float
-        Attainments for which tables state the evaluations.
-
-    Raises
-    ------
-    ValueError
-        Best and worst are the same.
-    """
+    """The table `[goal]` of a study."""
 
     objective: Annotated[str, Meta(description="the name of an objective")]
-    best: Number
+    best: Number  # best, worst: Values of the objective, in the user's unit, with attainment 1 and 0
     worst: Number
+    # Attainments for which tables state the evaluations.
     shares: Annotated[tuple[Share, ...], Meta(description="a list of numbers above 0 and at most 1")] = (0.9, 0.95, 0.99)
 
     def __post_init__(self) -> None:
@@ -99,26 +86,13 @@ class Goal(Section):
 
 @dataclass(frozen=True, eq=False)
 class GoalAttainment:
-    """The attainment of the goal on one problem.
+    """The attainment of the goal on one problem."""
 
-    Attributes
-    ----------
-    problem : str
-        Its label.
-    goal : Goal
-    objective : Objective
-    histories : (transcription, solver) -> one for each run
-        Of failed runs, too, which attain nothing.
-    verified : (transcription, solver) -> attainment of each run by its verified points
-        Of failed runs, too. Empty where points are not simulated.
-    seconds : (transcription, solver) -> the time of each finished run
-    """
-
-    problem: str
+    problem: str  # its label
     goal: Goal
     objective: Objective
-    histories: Mapping[tuple[str, str], Sequence[History]]
-    verified: Mapping[tuple[str, str], Sequence[float]]
+    histories: Mapping[tuple[str, str], Sequence[History]]  # of failed runs, too, which attain nothing
+    verified: Mapping[tuple[str, str], Sequence[float]]  # of failed runs, too. Empty where points are not simulated.
     seconds: Mapping[tuple[str, str], Sequence[float]]
 
     def tables(self) -> dict[str, Table]:

@@ -39,20 +39,7 @@ def front_figure(
     marked: Points | None = None,
     truth_name: str = "truth",
 ) -> Figure:
-    """All points of all runs: one colour and marker a solver, the truth as a line where it is dense.
-
-    Parameters
-    ----------
-    fronts : solver -> a front for each run
-        Fronts, or arrays (n, m) in the user's units and senses, m >= 2. Of more than two objectives, there is a panel for each two of them.
-    goals : m Objectives
-        Names, units and senses.
-    reference : Front or array, optional
-    marked : Front or array, optional
-        Points to mark by crosses and numbers from 1: those that another figure shows the flights of.
-    truth_name : str
-        Name of the reference in the legend.
-    """
+    """All points of all runs: one colour and marker a solver, the truth as a line where it is dense."""
     m, signs = len(goals), np.array([goal.sign for goal in goals])
     if m < 2:
         raise ValueError("there are no fronts of two or more objectives to draw")
@@ -89,14 +76,6 @@ def attainment_figure(
     """Best, median and worst attainment surface of each solver, of two objectives: a panel a solver, all with the same axes.
 
     The area between best and worst is shaded. A surface that is empty, because runs are, is not drawn; the legend names it.
-
-    Parameters
-    ----------
-    surfaces : solver -> Attainment
-    goals : 2 Objectives
-        Names, units and senses.
-    reference : Front or array, optional
-        In the user's units and senses.
     """
     if len(goals) != 2:
         raise ValueError(f"attainment surfaces are drawn of two objectives, not of {len(goals)}")
@@ -139,17 +118,6 @@ def convergence_figure(
     """An indicator over the cost of a run: the median of each solver's runs as a line, their quartiles as a band.
 
     Where half of the runs have nothing yet there is no line; where a quarter has nothing, the band is open towards the worse side.
-
-    Parameters
-    ----------
-    histories : solver -> (moments, values) for each run
-        As of `convergence.band`.
-    xlabel, ylabel : str
-        "evaluations", "inner iterations", "time [s]"; name of the indicator.
-    larger : bool
-        Whether larger values are better.
-    log : bool
-        Whether the indicator's axis is logarithmic, if a value is positive; those that are not are then not drawn.
     """
     with style():
         figure = new_figure(COLUMN, 2.5)

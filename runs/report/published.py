@@ -44,15 +44,7 @@ def papers(given: Any) -> list[Published]:
 
 
 def check_against(given: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem], solvers: Mapping[str, Solver]) -> None:
-    """Raise ValueError unless published tables are of problems, objectives and solvers that a study has.
-
-    Parameters
-    ----------
-    given : sequence of mappings
-        The study's `[[paper]]` sections.
-    problems, solvers : mapping
-        The study's, by label.
-    """
+    """Raise ValueError unless published tables are of problems, objectives and solvers that a study has."""
     for number, paper in enumerate(papers(given), 1):
         with errors_begin_with(_section(number, given[number - 1])):
             if paper.population and not any(isinstance(solver, PopulationSolver) for solver in solvers.values()):

@@ -50,35 +50,18 @@ def figures_of(row: Mapping[str, Any]) -> list[str]:
 
 
 class Published(Section, tag_field="of", kw_only=True):
-    """A published table, and the same figures of our runs. A kind of table is a class of this module.
+    """A published table, and the same figures of our runs. A kind of table is a class of this module."""
 
-    Attributes
-    ----------
-    rows : list of dict
-        `problem` and `by`, figures by key, and `statistic` where the kind has them.
-    source : str
-        The paper.
-    note : str
-        How the paper's figures were obtained.
-    differs : str
-        What differs in ours.
-    statistics : bool
-        Whether there are several rows for each solver, by their `statistic`: usually one of `STATISTICS`.
-    population : bool
-        Whether ours are of solvers with a population alone.
-    further : {key of a figure: head of its column}
-        Columns after those of the paper, of our figures alone.
-    """
-
+    # `problem` and `by`, figures by key, and `statistic` where the kind has them.
     rows: Annotated[list[dict[str, Any]], Meta(min_length=1, description="a list of tables")]
-    source: Text = ""
-    note: Text = ""
-    differs: Text = ""
+    source: Text = ""  # the paper
+    note: Text = ""  # how the paper's figures were obtained
+    differs: Text = ""  # what differs in ours
 
-    statistics: ClassVar[bool] = False
+    statistics: ClassVar[bool] = False  # whether there are several rows for each solver, by their `statistic`: usually one of `STATISTICS`
     statistic_head: ClassVar[str] = STATISTIC
-    population: ClassVar[bool] = False
-    further: ClassVar[Mapping[str, Column]] = {}
+    population: ClassVar[bool] = False  # whether ours are of solvers with a population alone
+    further: ClassVar[Mapping[str, Column]] = {}  # columns after those of the paper, of our figures alone
 
     def theirs(self, row: Mapping[str, Any]) -> Figures:
         """The figures of a row of the paper."""
@@ -338,18 +321,12 @@ class PayoffTable(Published, tag="payoff"):
 
 class Degrees(Published, tag="degrees", kw_only=True):
     """How well each choice of solvers that decide satisfies each objective. The `statistic` of a row names the choice; its figures are the
-    degrees by name of objectives.
+    degrees by name of objectives."""
 
-    Attributes
-    ----------
-    by : dict, optional
-        The preference by which all choices are measured, {"method": ..., "settings": {...}}. Default: each by its own.
-    regulating : tuple of float
-        Values of lambda for which eq. (53) of Bae and others is evaluated at the memberships, those of the paper's rows, too. Then these
-        are in order of priority.
-    """
-
+    # The preference by which all choices are measured, {"method": ..., "settings": {...}}. Default: each by its own.
     by: dict[str, Any] | None = None
+    # Values of lambda for which eq. (53) of Bae and others is evaluated at the memberships, those of the paper's rows, too. Then these
+    # are in order of priority.
     regulating: tuple[Number, ...] = ()
 
     statistics: ClassVar[bool] = True

@@ -61,16 +61,9 @@ class ReportKeys(msgspec.Struct):
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """The text of a report, and the files that were written.
+    """The text of a report, and the files that were written."""
 
-    Attributes
-    ----------
-    text : str
-        All tables, as a terminal shows them.
-    files : tuple of Path
-    """
-
-    text: str
+    text: str  # all tables, as a terminal shows them
     files: tuple[Path, ...]
 
     def __str__(self) -> str:
@@ -89,33 +82,7 @@ def report(
     trust: bool = False,
     page: Page | None = None,
 ) -> Report:
-    """The report on all finished runs of a study: its tables and figures are written into the folder `report` in the study's folder.
-
-    Parameters
-    ----------
-    out : path
-        The study's folder. Missing, failed and unreadable runs are counted in the report, and left out of its measures or counted as
-        failures.
-    foreign : {name: files}, optional
-        Fronts of other programs to compare with, a file for each run: CSV tables of objectives, or saved fronts; on the problem whose
-        objectives they have.
-    figures : bool
-        Whether figures are drawn, which takes most of the time.
-    progress : bool
-        Whether the terminal shows the progress.
-    trust : bool
-        Whether addresses in the folder's files may be loaded that are not in the catalogue: that runs the code they name.
-    page : Page, optional
-        Where the report is also written as a page in Markdown.
-
-    Raises
-    ------
-    ValueError
-        The folder contains no study, or no finished run, or for a page not all; a reference or foreign front cannot be read; an address
-        is not trusted.
-    OSError
-        A file cannot be written.
-    """
+    """The report on all finished runs of a study: its tables and figures are written into the folder `report` in the study's folder."""
     store = Store.open(out, trust)
     summary, study = store.summary(), store.definition
     if not summary.finished:

@@ -63,19 +63,11 @@ class Charge:
 
     The charged evaluations of a run are all of its counted work divided by `unit`. Work is counted in iterations of IPOPT times variables,
     see `Counts`; these take more or fewer instructions on programs of different kinds, so it is multiplied by `prices`.
-
-    Attributes
-    ----------
-    unit : float
-        What an evaluation takes, in the mean of its runs, by the solver without gradient solves whose evaluations take least.
-    solver : str
-        That solver.
-    prices : {cell: (price, price of gradient solves)}
-        Instructions that a unit of work takes on the cell's transcription, and on that of its gradient solves; 1 where all are on one.
     """
 
-    unit: float
-    solver: str
+    unit: float  # what an evaluation takes, in the mean of its runs, by the solver without gradient solves whose evaluations take least
+    solver: str  # that solver
+    # Instructions that a unit of work takes on the cell's transcription, and on that of its gradient solves; 1 where all are on one.
     prices: Mapping[Cell, tuple[float, float]]
 
     @classmethod

@@ -43,32 +43,17 @@ ESCAPES: dict[str, str] = {character: f"\\{character}" for character in "&%$#_{}
 
 @dataclass(frozen=True)
 class Column:
-    """The head of a column.
-
-    Attributes
-    ----------
-    title, unit : str
-    digits : int
-        Significant digits of its numbers; whole numbers (`int`) are written in full.
-    grouped : bool
-        Whether a cell that repeats the one above is left blank, in text and LaTeX.
-    """
+    """The head of a column."""
 
     title: str
     unit: str = ""
-    digits: int = 3
-    grouped: bool = False
+    digits: int = 3  # significant digits of its numbers; whole numbers (`int`) are written in full
+    grouped: bool = False  # whether a cell that repeats the one above is left blank, in text and LaTeX
 
 
 @dataclass(frozen=True)
 class Table:
-    """Columns and rows of cells, with a caption above and notes below.
-
-    Raises
-    ------
-    ValueError
-        If a row has not as many cells as there are columns.
-    """
+    """Columns and rows of cells, with a caption above and notes below."""
 
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]

@@ -21,16 +21,7 @@ def degree_of_controls(points: str, degree: int) -> int:
 
 
 def collocation_tables(points: str, degree: int, control_order: int, bernstein: bool) -> Tables:
-    """The interval with states of a degree, collocated at points of a kind: `degree` of Gauss's or Radau's, one more of the others.
-
-    Parameters
-    ----------
-    points : str
-        One of `POINTS`.
-    degree, control_order : int
-    bernstein : bool
-        Whether controls have coefficients of Bernstein polynomials instead of values at nodes.
-    """
+    """The interval with states of a degree, collocated at points of a kind: `degree` of Gauss's or Radau's, one more of the others."""
     basis, full = BASES[points], degree_of_controls(points, degree)
     tau = polynomials.nodes(basis, full)
     # The Runge-Kutta method: integrals of the rates' polynomial through their values at the points.

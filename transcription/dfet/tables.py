@@ -15,11 +15,6 @@ def dfet_tables(order: int, control_order: int, basis: str) -> Tables:
     from the rates there. The trajectory is the collocation polynomial of the (l + 1)-stage Gauss-Legendre Runge-Kutta method that is
     equivalent for q <= l: through the states at its stages and at both ends. It is more accurate by one order than the states' own
     polynomial of degree l.
-
-    Parameters
-    ----------
-    order, control_order : int
-    basis : "lobatto" or "bernstein"
     """
     tau, weights = polynomials.gauss_legendre(max(order, control_order) + 1)
     stages, tests = polynomials.gauss_legendre(order + 1)[0], order + 2

@@ -29,21 +29,7 @@ SMALL, SHORT = 48, 30_000
 
 
 class Propagation:
-    """The elements of a phase as Functions; see the module.
-
-    Parameters
-    ----------
-    elements : int
-    tables : Tables
-    phase : CompiledPhase
-
-    Attributes
-    ----------
-    quick : bool
-        Whether Newton steps are written out.
-    inputs : int
-        nx + (q + 1) nu + 2 + len(s): the number of scalar inputs of an element.
-    """
+    """The elements of a phase as Functions; see the module."""
 
     def __init__(self, elements: int, tables: Tables, phase: CompiledPhase) -> None:
         self.n, self.tables, self.phase = elements, tables, phase

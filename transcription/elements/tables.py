@@ -14,49 +14,31 @@ from ..numerics import polynomials
 class Tables:
     """An element with the states L and R at its ends, which are unknowns of their own, and k coefficients X of the states inside.
 
-    Dynamics are evaluated at nq points, and their equations are affine in L, X, R and the rates f there, each times half of the length:
-    [L X R] `balance` + f `test` = 0.
-
-    Attributes
-    ----------
-    tau, weights : arrays (nq,)
-        Where dynamics and integrands are evaluated, and the weights of the quadrature.
-    inside : array (k + 2, nq)
-        States there from [L X R].
-    balance, test : arrays (k + 2, rows), (nq, rows)
-        The equations, in the order of time: R enters the last of them with -1, and no other.
-    implicit, recover : arrays (nq, nq), (nq, k)
-        The same equations solved for the states at the points, and for X: these are L plus the length times the rates at the points times
-        this. The first is the transposed matrix of the equivalent Runge-Kutta method.
-    nodes : array (k,)
-        Abscissae of X.
-    stages, at_stages : arrays (k,), (k, k)
-        Where trajectories have their states between the ends, and these states from X.
-    closed : str
-        Basis of the polynomial through L, the states at the stages and R.
-    control_basis, control_order : str, int
-        Of the controls.
-    exact : array (control_order + 1,)
-        Where path constraints are imposed that are equalities: as many points as a control has coefficients. At more of them the equations
-        would determine more than there is to choose.
-    costate_basis, costates : str, array (coefficients, rows)
-        Costates as polynomials on the element, from the multipliers of its equations; no basis: that is not known.
+    Dynamics are evaluated at nq points, and their equations are affine in L, X, R and the rates f there, each times half of the length: [L
+    X R] `balance` + f `test` = 0.
     """
 
-    tau: np.ndarray
+    tau: np.ndarray  # tau, weights: (nq,): Where dynamics and integrands are evaluated, and the weights of the quadrature
     weights: np.ndarray
-    inside: np.ndarray
+    inside: np.ndarray  # (k + 2, nq): States there from [L X R]
+    # balance, test: (k + 2, rows), (nq, rows): The equations, in the order of time: R enters the last of them with -1, and no other.
     balance: np.ndarray
     test: np.ndarray
+    # implicit, recover: (nq, nq), (nq, k): The same equations solved for the states at the points, and for X: these are L plus the length
+    # times the rates at the points times this. The first is the transposed matrix of the equivalent Runge-Kutta method.
     implicit: np.ndarray
     recover: np.ndarray
-    nodes: np.ndarray
-    stages: np.ndarray
+    nodes: np.ndarray  # (k,): Abscissae of X
+    stages: np.ndarray  # stages, at_stages: (k,), (k, k): Where trajectories have their states between the ends, and these states from X
     at_stages: np.ndarray
-    closed: str
-    control_basis: str
+    closed: str  # basis of the polynomial through L, the states at the stages and R
+    control_basis: str  # control_basis, control_order: Of the controls
     control_order: int
+    # (control_order + 1,): Where path constraints are imposed that are equalities: as many points as a control has coefficients. At more
+    # of them the equations would determine more than there is to choose.
     exact: np.ndarray
+    # costate_basis, costates: (coefficients, rows): Costates as polynomials on the element, from the multipliers of its equations; no
+    # basis: that is not known.
     costate_basis: str = ""
     costates: np.ndarray | None = None
 

@@ -21,26 +21,13 @@ from .base import InnerResult, InnerSolver, scored, started
 
 @dataclass(frozen=True)
 class Ipopt(InnerSolver):
-    """A nonlinear program for each candidate.
+    """A nonlinear program for each candidate."""
 
-    Parameters
-    ----------
-    objective : "projection" or "constant"
-        Least squares distance of the free variables from the candidate, in spans of their bounds; or nothing, as in the paper, which lets
-        the barrier drag the candidate towards the middle of its bounds.
-    max_iterations : int
-        Limit of each solve.
-    seconds : float
-        Safety net for each solve. What it stops has the status "timeout", unless it is feasible all the same, and is not reproducible.
-
-    Raises
-    ------
-    ValueError
-        For another objective, or limits that are not positive.
-    """
-
+    # Least squares distance of the free variables from the candidate, in spans of their bounds; or nothing, as in the paper, which lets
+    # the barrier drag the candidate towards the middle of its bounds.
     objective: str = "projection"
-    max_iterations: int = 300
+    max_iterations: int = 300  # limit of each solve
+    # Safety net for each solve. What it stops has the status "timeout", unless it is feasible all the same, and is not reproducible.
     seconds: float = 60.0
 
     def __post_init__(self) -> None:

@@ -27,32 +27,11 @@ def least_distance(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Minimise |x - center|^2 subject to lower <= A x <= upper and box[0] <= x <= box[1].
 
-    Newton's method on the dual, whose solution has x = center - A' multipliers, clipped to the box: which variables are clipped and
-    which constraints are active follows from the multipliers, and with them the next ones (a primal-dual active set method, Hintermueller,
-    Ito and Kunisch 2003). It ends when the constraints hold, and with them all conditions of a nearest point. Where it does not end,
-    non-negative least squares decide (Lawson and Hanson, "Solving least squares problems", 1974, chapter 23).
-
-    Parameters
-    ----------
-    center : array (k, d)
-    A : array (k, r, d)
-        Where entries are no finite numbers, the constraints are not met, and the point is the one nearest to the center.
-    lower, upper : arrays (k, r)
-        Infinite where there is no limit, equal for equations.
-    box : pair of arrays (k, d)
-    multipliers : array (k, r)
-        Where to begin: those of a problem nearby, or zeros.
-    exact : array (k,) of int, optional
-        How often non-negative least squares may still decide where Newton's method does not end, less once where they did; otherwise the
-        point is where it got to. Default: always.
-
-    Returns
-    -------
-    array (k, d)
-    array (k,) of bool
-        Whether the constraints are met. Where they contradict each other, the point is none in particular.
-    array (k, r)
-        Multipliers; zeros where none were found.
+    Newton's method on the dual, whose solution has x = center - A' multipliers, clipped to the box: which variables are clipped and which
+    constraints are active follows from the multipliers, and with them the next ones (a primal-dual active set method, Hintermueller, Ito
+    and Kunisch 2003). It ends when the constraints hold, and with them all conditions of a nearest point. Where it does not end,
+    non-negative least squares decide (Lawson and Hanson, "Solving least squares problems", 1974, chapter 23). center (k, d), A (k, r, d),
+    lower, upper (k, r), box (k, d), multipliers (k, r), exact (k,) -> (k, d), (k,), (k, r).
     """
     x, met, multipliers = _newton(center, A, lower, upper, box, multipliers)
     finite = np.isfinite(A).all(axis=(1, 2))

@@ -34,16 +34,11 @@ class Newton(InnerSolver):
     States are always those that the dynamics give. In spans of the free variables' bounds, each step goes towards the point nearest to the
     candidate that satisfies the linearised constraints and the bounds exactly. The curvature of the constraints, which these steps do not
     know, is made up for by Anderson acceleration. What has become feasible stays so, even if no nearest point is found.
-
-    Parameters
-    ----------
-    max_iterations : int
-    exact : int
-        How many steps of a candidate are found exactly, by non-negative least squares, where the faster method does not end. They may take
-        many times as long as all else; with few of them, fewer candidates become feasible.
     """
 
     max_iterations: int = 40
+    # How many steps of a candidate are found exactly, by non-negative least squares, where the faster method does not end. They may take
+    # many times as long as all else; with few of them, fewer candidates become feasible.
     exact: int = 1000
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
@@ -111,26 +106,8 @@ class Newton(InnerSolver):
 
 
 class _Going:
-    """The candidates of a batch that are not done, in the unit cube.
-
-    Attributes
-    ----------
-    index : array (k,) of int
-        Which of the batch they are.
-    x, center : arrays (k, d)
-        Where they are, and the candidates themselves.
-    watched : array (k, rows) of bool
-        The rows of the reduced problem that steps consider: equations, and what was violated on the way.
-    multipliers : array (k, rows)
-        Those of the last step.
-    settled : array (k,) of bool
-        Whether they are near enough to their candidates and only have to be feasible.
-    last : array (k,)
-        Length of the last step.
-    exact : array (k,) of int
-        How many steps more are found exactly where that takes long.
-    memory : Anderson
-    """
+    """The candidates of a batch that are not done, in the unit cube. index (k,), x, center (k, d), watched (k, rows), multipliers (k,
+    rows), settled (k,), last (k,), exact (k,)."""
 
     def __init__(self, nlp: NLP, start: np.ndarray, exact: int) -> None:
         refuse_dense(nlp)
@@ -212,13 +189,6 @@ class Anderson:
     """Remembers the last steps of k iterations x -> x + s(x) and combines them so that the linear part of s vanishes soonest.
 
     Anderson, "Iterative procedures for nonlinear integral equations", 1965; in the form of Walker and Ni, 2011.
-
-    Parameters
-    ----------
-    k, d : int
-        How many iterations, of how many variables.
-    memory : int
-        How many differences are kept.
     """
 
     def __init__(self, k: int, d: int, memory: int) -> None:

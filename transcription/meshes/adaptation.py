@@ -134,29 +134,8 @@ def refine(
 
     The elements of large error are refined; if none reaches the goal, those with the largest ones. Of these, the smooth ones ask for the
     order that is enough at their rate of decay, unless that is above the highest or it is cheaper to cut them; the others are cut: around
-    the place where a control is steep, else into as many equal parts as their error asks for.
-
-    Parameters
-    ----------
-    edges : array (N + 1,)
-        Increasing from 0 to 1.
-    order : int
-        Degree of the states on all elements.
-    error : array (N,)
-        What is to become at most 1. Infinite or no number: as bad as can be.
-    rate : array (N,)
-        At which coefficients decay with the degree; see `errors.decay_rates`.
-    steep : array (N,)
-        Where, on [-1, 1], a control is much steeper than elsewhere on the element; NaN if it is not.
-    most, highest : int
-        Number of elements, and order, that are not exceeded.
-
-    Returns
-    -------
-    edges : array
-        All the old ones among them.
-    order : int
-        The same arrays and order where nothing more may be done.
+    the place where a control is steep, else into as many equal parts as their error asks for. edges (N + 1,), error (N,), rate (N,), steep
+    (N,).
     """
     error = np.where(np.isnan(error), np.inf, error)
     marked = error >= min(1.0, WORST_SHARE * error.max(initial=0.0))

@@ -30,14 +30,7 @@ def curvatures(places: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Curvatures (k + 1, nx) of the graphs of quantities over their places, mended eq. (18), by finite differences.
 
     Shooting knows the states best at the ends of its steps, and where controls jump at a node, states have a kink there, which no
-    derivative inside a step sees but a second difference does.
-
-    Parameters
-    ----------
-    places : array (k + 1,)
-        Increasing.
-    x : array (k + 1, nx)
-        The quantities there, at least 3, in units in which their graphs are about as high as they are long.
+    derivative inside a step sees but a second difference does. places (k + 1,), x (k + 1, nx).
     """
     h, slopes = np.diff(places)[:, None], np.diff(x, axis=0) / np.diff(places)[:, None]
     bends = 2.0 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
@@ -112,16 +105,8 @@ def equidistributed(places: np.ndarray, values: np.ndarray, count: int) -> np.nd
 
 
 def segmented(places: np.ndarray, values: np.ndarray, ends: Sequence[float], counts: Sequence[int]) -> np.ndarray:
-    """The ends of intervals of a phase in segments, each with a number of intervals of its own, equidistributed in it.
-
-    Parameters
-    ----------
-    places, values : arrays (k + 1,), (k, 2)
-        A density.
-    ends : sequence of m + 1 floats
-        Where segments begin and end: from the first place to the last one.
-    counts : sequence of m int
-    """
+    """The ends of intervals of a phase in segments, each with a number of intervals of its own, equidistributed in it. places (k + 1,),
+    values (k, 2)."""
     found = [np.asarray(places[:1])]
     for first, last, count in zip(ends[:-1], ends[1:], counts, strict=True):
         found.append(equidistributed(*between(places, values, first, last), count)[1:])

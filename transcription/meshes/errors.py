@@ -25,42 +25,27 @@ FLAT = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class PhaseErrors:
-    """Of one phase of N elements. Scales are those of `state_scales` and `control_scales`.
+    """Of one phase of N elements. Scales are those of `state_scales` and `control_scales`."""
 
-    Attributes
-    ----------
-    defect : array (N,)
-        Largest difference between the state at the end of an element and the state that an integrator reaches from its beginning with its
-        controls, in scales; infinite where the integration breaks down.
-    sums : array (N,)
-        Share of each element in the error of integrals, as a quadrature with a node more than the degree of the states would have it, or in
-        that of peaks, by which these are higher between the nodes than at any node; 0 where there is none.
-    excess : array (N,)
-        How far states and path constraints leave their limits between nodes, in the scales of these.
-    leaving : array (N,)
-        The same for controls.
-    tail : array (N,)
-        How well polynomials of this degree describe the controls: the last two Legendre coefficients, in scales. Of constant controls: the
-        larger of the jumps to the neighbours.
-    weight : array (N,)
-        Share of each element in what happens: in the time, or in the way of a state, whichever is larger.
-    rate, control_rate : array (N,)
-        How fast Legendre coefficients of the states, and of the controls, decay: by a factor exp(-rate) with each degree, at the slowest.
-    integrand_rate : array (N,)
-        The same for integrands; 0 where a peak is higher between the nodes: there elements are to be shorter.
-    steep : array (N,)
-        Where a control is steepest or leaves a bound, in (-1, 1), if it does so much more than elsewhere on the element; else NaN.
-    """
-
+    # (N,): Largest difference between the state at the end of an element and the state that an integrator reaches from its beginning with
+    # its controls, in scales; infinite where the integration breaks down.
     defect: np.ndarray
+    # (N,): Share of each element in the error of integrals, as a quadrature with a node more than the degree of the states would have it,
+    # or in that of peaks, by which these are higher between the nodes than at any node; 0 where there is none.
     sums: np.ndarray
-    excess: np.ndarray
-    leaving: np.ndarray
+    excess: np.ndarray  # (N,): How far states and path constraints leave their limits between nodes, in the scales of these
+    leaving: np.ndarray  # (N,): The same for controls
+    # (N,): How well polynomials of this degree describe the controls: the last two Legendre coefficients, in scales. Of constant
+    # controls: the larger of the jumps to the neighbours.
     tail: np.ndarray
-    weight: np.ndarray
+    weight: np.ndarray  # (N,): Share of each element in what happens: in the time, or in the way of a state, whichever is larger
+    # rate, control_rate: (N,): How fast Legendre coefficients of the states, and of the controls, decay: by a factor exp(-rate) with each
+    # degree, at the slowest.
     rate: np.ndarray
     control_rate: np.ndarray
+    # (N,): The same for integrands; 0 where a peak is higher between the nodes: there elements are to be shorter.
     integrand_rate: np.ndarray
+    # (N,): Where a control is steepest or leaves a bound, in (-1, 1), if it does so much more than elsewhere on the element; else NaN.
     steep: np.ndarray
 
 

@@ -47,20 +47,8 @@ def switched(method: Method, problem: Problem | CompiledProblem, trajectory: Tra
     went, and edges that could move no further, begin anew; once they stay, all controls are free, so that an arc on which none should be
     constant shows. Called with what that method found: None, unless there are other switches now.
 
-    Controls stay within their bounds between nodes, too. Elements between the switches are as fine as before, or finer, and fewer where
-    all controls are on bounds. Not every proposal is better: compare.
-
-    Parameters
-    ----------
-    method : Meshed
-        By which the trajectory was found.
-    problem : Problem or CompiledProblem
-    trajectory : Trajectory
-
-    Returns
-    -------
-    Meshed or None
-        None: there are no switches but at moving edges, or the method moves no edges.
+    Controls stay within their bounds between nodes, too. Elements between the switches are as fine as before, or finer, and fewer where all
+    controls are on bounds. Not every proposal is better: compare.
     """
     if not method.moves_edges:
         return None
@@ -91,12 +79,6 @@ def at_switches(method: Method, trajectory: Trajectory) -> Method | None:
 
     Where an edge may move, an objective has many local optima that differ by less than what counts, since one element of high degree
     describes the end of an arc nearly as well as two do. In these, the costates are known less well.
-
-    Returns
-    -------
-    Meshed or None
-        None: there are no moving edges, or not as many as switches, or one cannot reach its own. Ends of contacts with limits, which are
-        known less well, are no switches here.
     """
     if not method.moves_edges:
         return None
@@ -193,19 +175,7 @@ class _Knot:
 def knots(
     found: Mapping[str, Sequence[Switch]], touching: Mapping[str, Sequence[Switch]], mesh: PhaseMesh, pressed: np.ndarray
 ) -> list[float]:
-    """Where edges are to move, increasing.
-
-    Parameters
-    ----------
-    found, touching : mappings
-        The switches of each control, and the contacts of each state and path constraint, which are known less well: near a switch of a
-        control they are this.
-    mesh : PhaseMesh
-        The mesh on which they were found. A switch at one of its moving edges is put exactly there.
-    pressed : array (m,)
-        For each of its moving edges, -1 or 1 if it is at the lower or the upper end of its range, else 0. Two that are pressed against each
-        other are one: between them there is nothing.
-    """
+    """Where edges are to move, increasing. pressed (m,)."""
     edges = np.array(mesh.edges)
     known = edges[list(mesh.moving)]
     target = known.copy()

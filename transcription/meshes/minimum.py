@@ -54,37 +54,18 @@ class Optimum:
 
 @dataclass(frozen=True, eq=False)
 class Gain:
-    """What controls of a phase could gain.
+    """What controls of a phase could gain."""
 
-    Attributes
-    ----------
-    amounts : array (N,)
-        The integral, over each element, of how much less the Hamiltonian could be: what the weighted objectives could gain there, to first
-        order, in units.
-    places : list of arrays
-        Where the controls for which it is least jump, on (-1, 1) of each element.
-    """
-
+    # (N,): The integral, over each element, of how much less the Hamiltonian could be: what the weighted objectives could gain there, to
+    # first order, in units.
     amounts: np.ndarray
-    places: list[np.ndarray]
+    places: list[np.ndarray]  # where the controls for which it is least jump, on (-1, 1) of each element
 
 
 def gains(
     problem: CompiledProblem, trajectory: Trajectory, optimum: Optimum, quantities: Sequence[np.ndarray], units: np.ndarray
 ) -> dict[str, Gain]:
-    """What the controls of each phase with costates could gain.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    trajectory : Trajectory
-        An optimum on its mesh.
-    optimum : Optimum
-    quantities : sequence of arrays
-        What objectives and constraints see of each phase.
-    units : array (m,)
-        What counts as one in each objective.
-    """
+    """What the controls of each phase with costates could gain. units (m,)."""
     # The sum of the objectives in which a gain is one unit of each.
     total = float(optimum.of_objectives @ units)
     if not total > 0:

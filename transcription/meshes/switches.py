@@ -37,22 +37,13 @@ a control that oscillates on an arc where it hardly matters jumps, too."""
 
 @dataclass(frozen=True)
 class Switch:
-    """One switch.
+    """One switch."""
 
-    Attributes
-    ----------
-    place : float
-        Relative to the phase, in (0, 1).
-    before, after : int
-        LOWER, INSIDE or UPPER.
-    certainty : float
-        In (0, 1]: 1 where two elements meet, or a single one shows both sides; less the wider it is smeared, and where an arc inside the
-        bounds begins or ends.
-    """
-
-    place: float
-    before: int
+    place: float  # relative to the phase, in (0, 1)
+    before: int  # before, after: LOWER, INSIDE or UPPER
     after: int
+    # In (0, 1]: 1 where two elements meet, or a single one shows both sides; less the wider it is smeared, and where an arc inside the
+    # bounds begins or ends.
     certainty: float
 
 
@@ -72,15 +63,7 @@ class Stretch:
 
 
 def stretches(places: np.ndarray, values: np.ndarray) -> list[Stretch]:
-    """The stretches of a control.
-
-    Parameters
-    ----------
-    places : array (N, k)
-        Where, relative to the phase, each of N elements is sampled, both ends included.
-    values : array (N, k)
-        The control there, as a fraction of the way from its lower to its upper bound.
-    """
+    """The stretches of a control. places (N, k), values (N, k)."""
     t, marks = places.ravel(), labels(values.ravel())
     changes = np.flatnonzero(np.diff(marks))
     firsts, lasts = np.append(0, changes + 1), np.append(changes, len(t) - 1)
@@ -108,15 +91,8 @@ def switches(places: np.ndarray, values: np.ndarray) -> list[Switch]:
 
 
 def contacts(places: np.ndarray, values: np.ndarray, lower: float, upper: float) -> list[Switch]:
-    """Where a state or a path constraint reaches and leaves its limits, or only touches one: from INSIDE to INSIDE.
-
-    Parameters
-    ----------
-    places, values : arrays (N, k)
-        As for `stretches`, but values in their own unit.
-    lower, upper : float
-        The limits; infinite where there is none.
-    """
+    """Where a state or a path constraint reaches and leaves its limits, or only touches one: from INSIDE to INSIDE. places, values (N,
+    k)."""
     near = CONTACT * float(np.ptp(values))
     if not near > 0.0 or lower == upper:
         return []

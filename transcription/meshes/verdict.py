@@ -33,27 +33,14 @@ HARDLY = 1e-2
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is good enough.
+    """What is good enough."""
 
-    Attributes
-    ----------
-    tolerance : float
-        Largest defect: of the simulated states from those of the mesh, in units of what the states do.
-    feasible : float
-        Largest excess of constraints, simulated and between nodes, in their scales.
-    leaving : float
-        The same for controls between nodes.
-    objectives : float, optional
-        Largest error of an objective, in its unit; by default `COST` tolerances.
-    confirmed : bool
-        Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does, and meshes are not refined
-        for controls that polynomials of their degree describe poorly.
-    """
-
-    tolerance: float
-    feasible: float
-    leaving: float = 0.0
-    objectives: float | None = None
+    tolerance: float  # largest defect: of the simulated states from those of the mesh, in units of what the states do
+    feasible: float  # largest excess of constraints, simulated and between nodes, in their scales
+    leaving: float = 0.0  # the same for controls between nodes
+    objectives: float | None = None  # largest error of an objective, in its unit; by default `COST` tolerances
+    # Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does, and meshes are not refined
+    # for controls that polynomials of their degree describe poorly.
     confirmed: bool = True
 
     @property
@@ -69,42 +56,20 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """The independent assessment of a trajectory on its mesh.
-
-    Attributes
-    ----------
-    problem : CompiledProblem
-    simulation : Simulation
-        Of the whole trajectory.
-    by_elements : Simulation
-        Of each element by itself.
-    errors : list of PhaseErrors
-        Element by element.
-    wanted : Wanted
-    defect : float
-        Largest difference between the simulated states and those of the mesh, at the ends of elements, in units of what the states do.
-    missed : float
-        Largest difference between the simulated objectives and those of the mesh, in their units.
-    missed_by_elements : float
-        The same for the simulation of each element by itself: the error of quadratures and of peaks between nodes.
-    growth : float
-        How much errors grow along the trajectory, where that was worth finding out; else 1.
-    narrow : float
-        The least that any state does, in spans of its bounds.
-    gains : mapping
-        What controls could still gain in each phase, see `minimum`, in units of the objectives; empty where that is not known.
-    """
+    """The independent assessment of a trajectory on its mesh."""
 
     problem: CompiledProblem
-    simulation: Simulation
-    by_elements: Simulation
-    errors: list[PhaseErrors]
+    simulation: Simulation  # of the whole trajectory
+    by_elements: Simulation  # of each element by itself
+    errors: list[PhaseErrors]  # element by element
     wanted: Wanted
+    # Largest difference between the simulated states and those of the mesh, at the ends of elements, in units of what the states do.
     defect: float
-    missed: float
-    missed_by_elements: float
-    growth: float
-    narrow: float
+    missed: float  # largest difference between the simulated objectives and those of the mesh, in their units
+    missed_by_elements: float  # the same for the simulation of each element by itself: the error of quadratures and of peaks between nodes
+    growth: float  # how much errors grow along the trajectory, where that was worth finding out; else 1
+    narrow: float  # the least that any state does, in spans of its bounds
+    # What controls could still gain in each phase, see `minimum`, in units of the objectives; empty where that is not known.
     gains: Mapping[str, Gain] = field(default_factory=dict)
 
     @property
@@ -232,18 +197,7 @@ class ElementScores:
 def judge(
     problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: np.ndarray, units: np.ndarray, optimum: Optimum | None = None
 ) -> Verdict:
-    """The assessment of a trajectory by an integrator that is far more exact than the tolerance; see `Verdict`.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    trajectory : Trajectory
-    wanted : Wanted
-    F, units : arrays (m,)
-        Its objectives on the mesh, all minimised, and what counts as one in each.
-    optimum : Optimum, optional
-        Its costates and multipliers, if it is an optimum on its mesh.
-    """
+    """The assessment of a trajectory by an integrator that is far more exact than the tolerance; see `Verdict`. F, units (m,)."""
     rtol = wanted.accuracy
     scales = {name: state_scales(phase) for name, phase in trajectory.items()}
     # The integrator's absolute tolerance is stated in spans.

@@ -39,29 +39,7 @@ OPPOSING = 1e-2
 
 
 def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max_iterations: int = 300, seconds: float = 600.0) -> Solved:
-    """A vector near a start (n,) that is feasible, or violates least in sum: no smaller change of it violates less.
-
-    Parameters
-    ----------
-    nlp : NLP
-    start : array (n,)
-        A full vector; its states need not obey the dynamics.
-    tolerance : float
-        Largest scaled residual of a feasible vector.
-    max_iterations, seconds : int, float
-        Limits of the solve. The time is a safety net: what it ends is not reproducible.
-
-    Returns
-    -------
-    Solved
-        Its status is "converged" if it is feasible; "infeasible" if its violation can get no smaller nearby; else "failed", or "timeout".
-        Objectives were not minimised. The start itself, with status "timeout" and not begun, if the work is to end early (`stopping`).
-
-    Raises
-    ------
-    ValueError
-        If a peak is used otherwise than minimised or bounded above.
-    """
+    """A vector near a start (n,) that is feasible, or violates least in sum: no smaller change of it violates less."""
     start = back_in_bounds(nlp, start)
     if stopping():
         return not_begun(nlp, start)

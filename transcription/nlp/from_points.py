@@ -84,52 +84,17 @@ class FromPoints:
 
 @dataclass(frozen=True, eq=False)
 class _Common:
-    """What a Function has in common at all of its points: u(p).
+    """What a Function has in common at all of its points: u(p)."""
 
-    Attributes
-    ----------
-    of : list of int
-        Which inputs are p.
-    slopes : Function
-        p -> (u, du/dp).
-    curvature : Function
-        (p, of_u) -> half of the Hessian of of_u'u.
-    A : DM
-        dp/dz.
-    to : DM
-        Derivatives by u of all inputs that vary, at all points of all Functions.
-    """
-
-    of: list[int]
-    slopes: ca.Function
-    curvature: ca.Function
-    A: ca.DM
-    to: ca.DM
+    of: list[int]  # which inputs are p
+    slopes: ca.Function  # p -> (u, du/dp)
+    curvature: ca.Function  # (p, of_u) -> half of the Hessian of of_u'u
+    A: ca.DM  # dp/dz
+    to: ca.DM  # derivatives by u of all inputs that vary, at all points of all Functions
 
 
 class _Point:
-    """A Function at one point, where some of its inputs vary with z and the others do not.
-
-    Parameters
-    ----------
-    function : Function
-        y -> w.
-    vary, alike : arrays of int
-        Which inputs vary, and which of these are the same at all points.
-
-    Attributes
-    ----------
-    vary, fixed : list of int
-    u : list
-        Expressions of those inputs that vary and are the same at all points, where they are worth to be evaluated once for all; these are
-        further inputs that vary, after the others.
-    count : int
-        Number of inputs that vary, with these.
-    slopes : Function
-        (varying, fixed) -> (w, nonzeros of its Jacobian by those that vary).
-    sparsity : Sparsity
-        Of this Jacobian.
-    """
+    """A Function at one point, where some of its inputs vary with z and the others do not."""
 
     def __init__(self, function: ca.Function, vary: np.ndarray, alike: np.ndarray) -> None:
         size, kind = function.numel_in(0), kind_of(function)
@@ -157,34 +122,16 @@ class _Point:
 
 @dataclass(frozen=True, eq=False)
 class _Frame:
-    """What of the derivatives of an NLP is known before z is.
-
-    Attributes
-    ----------
-    points : list of _Point
-    common : list of _Common or None
-        Of each of these.
-    A : DM
-        Derivatives by z of all inputs that vary, at all points.
-    slopes : Sparsity
-        Of the Jacobians at all points.
-    rows, quantities : tuple of DM
-        Derivatives of L and of q by z and by the values at all points.
-    scores : Function
-        q -> (F, c, dF/dq, dc/dq).
-    curvature : Function
-        (q, of_scores) -> half of the Hessian of of_scores'(F, c) by those quantities that are `curved`.
-    curved : list of int
-    """
+    """What of the derivatives of an NLP is known before z is."""
 
     points: list[_Point]
-    common: list[_Common | None]
-    A: ca.DM
-    slopes: ca.Sparsity
-    rows: tuple[ca.DM, ca.DM]
+    common: list[_Common | None]  # of each of these
+    A: ca.DM  # derivatives by z of all inputs that vary, at all points
+    slopes: ca.Sparsity  # of the Jacobians at all points
+    rows: tuple[ca.DM, ca.DM]  # rows, quantities: Derivatives of L and of q by z and by the values at all points
     quantities: tuple[ca.DM, ca.DM]
-    scores: ca.Function
-    curvature: ca.Function
+    scores: ca.Function  # q -> (F, c, dF/dq, dc/dq)
+    curvature: ca.Function  # (q, of_scores) -> half of the Hessian of of_scores'(F, c) by those quantities that are `curved`
     curved: list[int]
 
 

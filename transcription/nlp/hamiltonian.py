@@ -27,16 +27,8 @@ def integral_weights(
     of_objectives: np.ndarray,
     of_constraints: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """What a unit of each integral (nq,) counts, by phase: its slope in the sum of objectives and constraints, each times its multiplier.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    quantities : sequence of arrays
-        What objectives and constraints see of each phase.
-    parameters : array
-    of_objectives, of_constraints : arrays
-    """
+    """What a unit of each integral (nq,) counts, by phase: its slope in the sum of objectives and constraints, each times its
+    multiplier."""
     slopes = _slopes(problem).call([*quantities, parameters, of_objectives, of_constraints])
     found = {}
     for phase, slope in zip(problem.phases, slopes, strict=True):

@@ -38,18 +38,10 @@ REFINEMENTS, EXACT = 3, 1e-12
 @dataclass(frozen=True, eq=False)
 class Multipliers:
     """Multipliers of a vector of an NLP, in the user's units: up to the residual of its `optimality`, the derivatives of the sum of
-    objectives, rows and variables, each times its own, vanish.
+    objectives, rows and variables, each times its own, vanish."""
 
-    Attributes
-    ----------
-    of_objectives : array (m,)
-        Not negative; in the scales of the objectives they sum to 1.
-    of_rows, of_bounds : arrays (r,), (n,)
-        Of the rows and of the variables' bounds, positive at upper limits.
-    """
-
-    of_objectives: np.ndarray
-    of_rows: np.ndarray
+    of_objectives: np.ndarray  # (m,): Not negative; in the scales of the objectives they sum to 1
+    of_rows: np.ndarray  # of_rows, of_bounds: (r,), (n,): Of the rows and of the variables' bounds, positive at upper limits
     of_bounds: np.ndarray
 
 
@@ -65,24 +57,9 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
     where mu >= 0 sums to 1, lambda belongs to equalities, nu >= 0 to inequalities and bounds with slacks c >= 0, and where the derivatives
     with respect to the other variables, the states, vanish: lambda is the adjoint that the dynamics give, and what is left is the gradient
     in the controls, times and parameters (Fritz John's conditions in the objectives; Karush, Kuhn and Tucker's in the constraints). At a
-    local Pareto optimum that is regular it is 0. Elsewhere it is how fast all objectives can fall together, in their scales per span of
-    the free variables. It does not include violations; and a point that is optimal in the weak sense only, one objective being at its
-    least value while another could still fall, has 0 as well.
-
-    Parameters
-    ----------
-    nlp : NLP
-    z : array (n,)
-        Feasible.
-    F_scales : array (m,), optional
-        What counts as one in each objective, the front's range for instance; by default, and for entries
-        that are not positive, `nlp_scales`. An objective with an infinite one is left out.
-
-    Returns
-    -------
-    float
-        Not negative; infinite where a derivative is no number, where the equations do not determine the states, and where no multipliers
-        are found.
+    local Pareto optimum that is regular it is 0. Elsewhere it is how fast all objectives can fall together, in their scales per span of the
+    free variables. It does not include violations; and a point that is optimal in the weak sense only, one objective being at its least
+    value while another could still fall, has 0 as well. z (n,), F_scales (m,).
     """
     conditions = Conditions.of(nlp, z, F_scales)
     return np.inf if conditions is None else conditions.residual
@@ -90,30 +67,18 @@ def optimality(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> f
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """First derivatives at a vector of an NLP, in units: variables in `units`, objectives and rows in their scales.
-
-    Attributes
-    ----------
-    nlp : NLP
-    z : array (n,)
-    scales : array (m,)
-        Of the objectives; infinite for those left out.
-    of_objectives, of_equations, of_inequalities : arrays (used, n), (equations, n), (k, n)
-        Gradients of the objectives that are not left out, of the equations, and of the inequalities c >= 0 that may have a multiplier.
-    near : list of arrays
-        Masks of these inequalities: lower and upper bounds (n,), lower and upper limits of rows (r,).
-    slack : array (k,)
-        Of the inequalities.
-    """
+    """First derivatives at a vector of an NLP, in units: variables in `units`, objectives and rows in their scales. z (n,)."""
 
     nlp: NLP
     z: np.ndarray
-    scales: np.ndarray
+    scales: np.ndarray  # (m,): Of the objectives; infinite for those left out
+    # of_objectives, of_equations, of_inequalities: (used, n), (equations, n), (k, n): Gradients of the objectives that are not left out,
+    # of the equations, and of the inequalities c >= 0 that may have a multiplier.
     of_objectives: np.ndarray
     of_equations: csr_matrix
     of_inequalities: np.ndarray
-    near: list[np.ndarray]
-    slack: np.ndarray
+    near: list[np.ndarray]  # masks of these inequalities: lower and upper bounds (n,), lower and upper limits of rows (r,)
+    slack: np.ndarray  # (k,): Of the inequalities
 
     @classmethod
     def of(cls, nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Linearised | None:
@@ -133,16 +98,11 @@ class Linearised:
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """The conditions of Pareto optimality at a vector of an NLP, without the multipliers of its equations, which follow from the others.
-
-    Attributes
-    ----------
-    linear : Linearised
-    reduced, adjoints : arrays (d, k), (equations, k)
-        Reduced gradients of the objectives and of the inequalities, and the multipliers of the equations that belong to them.
-    """
+    """The conditions of Pareto optimality at a vector of an NLP, without the multipliers of its equations, which follow from the others."""
 
     linear: Linearised
+    # reduced, adjoints: (d, k), (equations, k): Reduced gradients of the objectives and of the inequalities, and the multipliers of the
+    # equations that belong to them.
     reduced: np.ndarray
     adjoints: np.ndarray
 
@@ -289,22 +249,8 @@ def _by_elimination(
 
 
 def steepest(metric: Any, equations: Any, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The s (n, k) that minimise s'metric s/2 - gradient's where equations s = 0, for k gradients (k, n); and the multipliers (r, k) of
-    the equations.
-
-    Parameters
-    ----------
-    metric : sparse array (n, n)
-        Positive on what satisfies the equations.
-    equations : sparse array (r, n)
-        Some may follow from others.
-    gradients : array (k, n)
-
-    Raises
-    ------
-    RuntimeError
-        If the system is singular.
-    """
+    """The s (n, k) that minimise s'metric s/2 - gradient's where equations s = 0, for k gradients (k, n); and the multipliers (r, k) of the
+    equations. metric (n, n), equations (r, n)."""
     r, n = equations.shape
     exact, regular = (bmat([[metric, equations.T], [equations, diags(np.full(r, -last))]], "csc") for last in (0.0, REGULAR))
     found = _solved(splu(regular), exact, np.vstack([gradients.T, np.zeros((r, len(gradients)))]))

@@ -40,33 +40,18 @@ still a large step, and points are feasible to 1e-6; and where it is asked what 
 @dataclass(frozen=True, eq=False)
 class Projection:
     """The objectives' gradients at a vector of an NLP, projected on what is active there: a tangent space where all of that has a
-    multiplier, else a cone, since what has none may be left.
-
-    Attributes
-    ----------
-    nlp : NLP
-    scales : array (m,)
-        Of the objectives.
-    weights : array (m,)
-        Multipliers of the objectives in these scales, not negative and of sum 1, that leave the least of their gradients.
-    variations : array (n, k)
-        Gradients of the objectives, of the inequalities that are held, and of those that may be left, in the metric: variations in units
-        along which the equations stay satisfied, and so does what bounds peaks.
-    columns : array (q, k)
-        The same in coordinates in which the metric is Euclid's.
-    held : int
-        How many inequalities are held.
-    conditions : Conditions
-        Of optimality, with these scales.
-    """
+    multiplier, else a cone, since what has none may be left."""
 
     nlp: NLP
-    scales: np.ndarray
+    scales: np.ndarray  # (m,): Of the objectives
+    # (m,): Multipliers of the objectives in these scales, not negative and of sum 1, that leave the least of their gradients.
     weights: np.ndarray
+    # (n, k): Gradients of the objectives, of the inequalities that are held, and of those that may be left, in the metric: variations in
+    # units along which the equations stay satisfied, and so does what bounds peaks.
     variations: np.ndarray
-    columns: np.ndarray
-    held: int
-    conditions: Conditions
+    columns: np.ndarray  # (q, k): The same in coordinates in which the metric is Euclid's
+    held: int  # how many inequalities are held
+    conditions: Conditions  # of optimality, with these scales
 
     @cached_property
     def free(self) -> np.ndarray:

@@ -90,39 +90,19 @@ MONOTONE = _Strategy((("mu_init", 0.1),), share=0.46)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solved:
-    """The result of one solve.
+    """The result of one solve."""
 
-    Attributes
-    ----------
-    z : array (n,)
-        The vector that was found, within its bounds, periodic variables wrapped; the start where nothing was.
-    F : array (m,)
-        Objectives there, all minimised.
-    violation : float
-        Largest scaled residual of the NLP there; infinite where it is no number.
-    status : str
-        "converged" (a local optimum, and feasible by `NLP.evaluate` and within all limits), "infeasible", "failed" or "timeout".
-    iterations : int
-        Of IPOPT, by all strategies together.
-    message : str
-        Why the solve ended where it did not converge by itself, never empty then: the limit that was reached, or what IPOPT says.
-    multipliers : array (m + r,) or None
-        Of the objectives, not negative, and of the rows of the NLP: with those of the bounds, the derivatives of the weighted sum of both
-        vanish. None where nothing was solved.
-    clocked : bool
-        Whether a clock ended any of the work: then the same solve need not give the same again.
-    begun : bool
-        False if there was no solve: the work was to end before.
-    """
-
-    z: np.ndarray
-    F: np.ndarray
-    violation: float
-    status: str
-    iterations: int
-    clocked: bool = False
-    begun: bool = True
+    z: np.ndarray  # (n,): The vector that was found, within its bounds, periodic variables wrapped; the start where nothing was
+    F: np.ndarray  # (m,): Objectives there, all minimised
+    violation: float  # largest scaled residual of the NLP there; infinite where it is no number
+    status: str  # "converged" (a local optimum, and feasible by `NLP.evaluate` and within all limits), "infeasible", "failed" or "timeout"
+    iterations: int  # of IPOPT, by all strategies together
+    clocked: bool = False  # whether a clock ended any of the work: then the same solve need not give the same again
+    begun: bool = True  # false if there was no solve: the work was to end before
+    # Why the solve ended where it did not converge by itself, never empty then: the limit that was reached, or what IPOPT says.
     message: str = ""
+    # (m + r,): Of the objectives, not negative, and of the rows of the NLP: with those of the bounds, the derivatives of the weighted sum
+    # of both vanish. None where nothing was solved.
     multipliers: np.ndarray | None = None
 
     def __repr__(self) -> str:
@@ -186,44 +166,8 @@ def scalarize(
     persistent: bool = True,
     near: bool = False,
 ) -> Solved:
-    """Go down from a point to the front: least alpha with F - reference <= alpha weights.
-
-    Parameters
-    ----------
-    nlp : NLP
-    start : array (n,)
-        A full vector; its states need not obey the dynamics. From a point near the answer the solve takes a few iterations.
-    reference, weights : arrays (m,)
-        For minimised objectives. Weights are not negative, and are what counts as much in each objective; weight 0: a hard limit at the
-        reference. Reference +inf: the objective does not matter.
-    ceiling : array (m,), optional
-        Hard limits of the objectives beside; +inf for none.
-    margin : array (r,), optional
-        By how much, in their scales, rows of the NLP are to stay inside their limits; where these are too near to each other for that, in
-        the middle. Default: not at all.
-    tolerance : float
-        Largest scaled residual of a feasible point.
-    max_iterations, seconds : int, float
-        Most iterations of IPOPT by all strategies together, and the time of each run. The time is a safety net: what it ends is not
-        reproducible.
-    persistent : bool
-        Give each strategy a share of the iterations, at least `LEAST`. Otherwise the first may take them all, and others what is left
-        where it ended badly.
-    near : bool
-        Look near the start only, though it is not feasible yet: it is the optimum of almost the same, as on another mesh.
-
-    Returns
-    -------
-    Solved
-        A local optimum. It may be worse than a feasible start: where that matters, compare, or give the start's objectives as ceiling. The
-        start itself, with status "timeout" and not begun, if the work is to end early (`stopping`).
-
-    Raises
-    ------
-    ValueError
-        If shapes do not match, a weight is negative or none that matters is positive, the start is no number, or a peak is used otherwise
-        than minimised or bounded above.
-    """
+    """Go down from a point to the front: least alpha with F - reference <= alpha weights. start (n,), reference, weights (m,), ceiling
+    (m,), margin (r,)."""
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     if stopping():
         return not_begun(nlp, start)

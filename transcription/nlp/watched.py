@@ -28,16 +28,6 @@ class Watched:
 
     IPOPT looks at its own limits of time between iterations, too: this ends a solve as soon as these could. A factorisation, and the search
     along one step, cannot be ended.
-
-    Parameters
-    ----------
-    name, parts, options
-        Arguments of `casadi.nlpsol`.
-
-    Raises
-    ------
-    Stopped
-        If the work was asked to end before the program was built.
     """
 
     def __init__(self, name: str, parts: Any, options: Mapping[str, Any]) -> None:

@@ -32,20 +32,6 @@ class Batched:
     Where a C compiler is present, a Function that has worked enough is compiled. The compiled one does the same operations in the same
     order; it is taken only if it gives the same bits on the batch at hand. Set the environment variable MACS_COMPILE to 0 to never compile,
     to "always" to compile at the first call.
-
-    Parameters
-    ----------
-    function : casadi.Function
-    compiled : bool
-        Whether it may be compiled; not where it has a rootfinder or the like.
-    wide : callable, optional
-        k -> what `function.map(k)` is, to the last bit, but faster. It is asked for one number of calls only, that into which the first
-        large batch divides evenly: batches are mostly of one size.
-
-    Attributes
-    ----------
-    instructions : int
-        That one call goes through.
     """
 
     def __init__(self, function: ca.Function, *, compiled: bool = True, wide: Callable[[int], ca.Function] | None = None) -> None:
@@ -61,11 +47,6 @@ class Batched:
         """Outputs (k, nonzeros of each) for k calls.
 
         Every input has what the calls take one after the other, column by column: its leading axis is k, or a multiple of it.
-
-        Raises
-        ------
-        RuntimeError
-            If the Function fails, as a user's Callback may.
         """
         k = len(inputs[0])
         arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
@@ -141,19 +122,7 @@ def _length(function: ca.Function) -> int:
 
 
 def widened(function: ca.Function, k: int) -> ca.Function:
-    """k calls of a Function at once, operation by operation: to the last bit what k calls give.
-
-    Parameters
-    ----------
-    function : Function
-        A list of scalar operations (an SXFunction) of dense inputs and outputs.
-    k : int
-
-    Returns
-    -------
-    Function
-        Of matrices (k, size of the input) to matrices (k, size of the output), whose rows are the calls.
-    """
+    """k calls of a Function at once, operation by operation: to the last bit what k calls give."""
     symbols = [ca.MX.sym(f"i{i}", k, function.numel_in(i)) for i in range(function.n_in())]
     entries = [ca.horzsplit(symbol) if symbol.numel() else [] for symbol in symbols]
     found: list[list[ca.MX]] = [[ca.MX()] * function.numel_out(i) for i in range(function.n_out())]

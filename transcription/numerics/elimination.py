@@ -15,16 +15,6 @@ def eliminate(matrix: ca.SX, right: ca.SX) -> ca.SX:
     Gaussian elimination with pivots on the diagonal, in the order that fills in least (Markowitz 1957). There is no pivoting for size, so
     the values are only good where the diagonal dominates or nearly does, as in a Newton step of a short element: the caller has to check
     the residual.
-
-    Parameters
-    ----------
-    matrix : SX (n, n)
-        With a structurally nonzero diagonal.
-    right : SX (n, k)
-
-    Returns
-    -------
-    SX (n, k)
     """
     rows, sides = _rows(matrix), _rows(right)
     order = _forward(rows, sides)

@@ -29,26 +29,15 @@ SAME = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class PhaseMultipliers:
-    """The multipliers of one phase, positive at upper limits.
+    """The multipliers of one phase, positive at upper limits."""
 
-    Attributes
-    ----------
-    dynamics : array (k,)
-        Of its rows of dynamics.
-    paths, peaks, states : sequence of arrays
-        Of the samples of each path constraint and each peak, and of the hidden states that have bounds.
-    integrals : array (nq,)
-        What a unit of each integral counts.
-    variables : array (n,)
-        Of the bounds of all variables of the NLP.
-    """
-
-    dynamics: np.ndarray
+    dynamics: np.ndarray  # (k,): Of its rows of dynamics
+    # paths, peaks, states: Of the samples of each path constraint and each peak, and of the hidden states that have bounds.
     paths: Sequence[np.ndarray]
     peaks: Sequence[np.ndarray]
     states: Sequence[np.ndarray]
-    integrals: np.ndarray
-    variables: np.ndarray
+    integrals: np.ndarray  # (nq,): What a unit of each integral counts
+    variables: np.ndarray  # (n,): Of the bounds of all variables of the NLP
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,18 +73,7 @@ class Ending:
 
 
 def swept(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, weights: np.ndarray, ending: Ending) -> Adjoint:
-    """The costates of a trajectory, backward from its end.
-
-    Parameters
-    ----------
-    phase : CompiledPhase
-    trajectory : PhaseTrajectory
-    s : array
-        Its times and the parameters.
-    weights : array (nq,)
-        Of its integrals.
-    ending : Ending
-    """
+    """The costates of a trajectory, backward from its end. weights (nq,)."""
     t0, length, nx = trajectory.t0, trajectory.tf - trajectory.t0, len(phase.states)
     cells, densities = _cells(t0 + length * ending.places, ending.spread, trajectory)
     edges, jumps = _pieces(trajectory, t0 + length * ending.places, ending.jumps, cells)

@@ -16,20 +16,7 @@ def line(start: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def along(given: Any, t0: np.ndarray, tf: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """A user's guess where it is needed.
-
-    Parameters
-    ----------
-    given : float, pair of floats, or pair of arrays (times, values)
-        A constant, a straight line from t0 to tf, or samples to interpolate in time, as `Phase.guess` takes them.
-    t0, tf : arrays (k,)
-    share : array (...)
-        Where, between 0 at t0 and 1 at tf.
-
-    Returns
-    -------
-    array (k, ...)
-    """
+    """A user's guess where it is needed. given (times, values), t0, tf (k,), share (...) -> (k, ...)."""
     first, second = given if np.ndim(given) else (given, given)
     if np.ndim(first):
         return np.interp(line(t0, tf, share), first, second)

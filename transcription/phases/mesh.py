@@ -20,33 +20,15 @@ SAME = 1e-9
 
 @dataclass(frozen=True, repr=False)
 class PhaseMesh:
-    """Elements of any lengths, of one order.
+    """Elements of any lengths, of one order."""
 
-    Parameters
-    ----------
-    edges : sequence of N + 1 floats
-        Ends of the elements, relative to the phase: increasing from 0 to 1.
-    order : int
-        Degree of the states on each element.
-    control_order : int, optional
-        Degree of the controls on each element; by default the method's own rule.
-    moving : sequence of int
-        Those of the inner edges, 1 to N - 1, whose places are variables of the NLP and begin where `edges` has them. The edges between
-        two of these, or one and an end of the phase, share the distance as they do here.
-    constant : mapping or pairs of a name and a sequence of int
-        Controls that have one value on some arcs: which of these, 0 to m, where m moving edges part m + 1 arcs.
-
-    Raises
-    ------
-    ValueError
-        If the edges are not such, an order is no whole number of at least 0, a moving edge is no inner one, an arc none of these, or one of
-        them given twice.
-    """
-
-    edges: tuple[float, ...]
-    order: int
-    control_order: int | None = None
+    edges: tuple[float, ...]  # ends of the elements, relative to the phase: increasing from 0 to 1
+    order: int  # degree of the states on each element
+    control_order: int | None = None  # degree of the controls on each element; by default the method's own rule
+    # Those of the inner edges, 1 to N - 1, whose places are variables of the NLP and begin where `edges` has them. The edges between two
+    # of these, or one and an end of the phase, share the distance as they do here.
     moving: tuple[int, ...] = ()
+    # Controls that have one value on some arcs: which of these, 0 to m, where m moving edges part m + 1 arcs.
     constant: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
     def __post_init__(self) -> None:

@@ -13,20 +13,11 @@ from ..numerics.batched import expanded
 
 @dataclass(frozen=True, eq=False)
 class Pointwise:
-    """A Function y -> w of columns, at k points.
-
-    Attributes
-    ----------
-    function : Function
-    inputs : MX (size of y, k)
-        In the variables z.
-    values : MX (size of w, k)
-        Symbols of what it returns.
-    """
+    """A Function y -> w of columns, at k points."""
 
     function: ca.Function
-    inputs: ca.MX
-    values: ca.MX
+    inputs: ca.MX  # in the variables z
+    values: ca.MX  # symbols of what it returns
 
     @classmethod
     def of(cls, function: ca.Function, inputs: Sequence[ca.MX]) -> Pointwise:
@@ -49,21 +40,10 @@ class Pointwise:
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """An NLP as rows L(z, w) and scores(q(z, w)), where L and q are affine and each w is evaluated at points, whose inputs are affine in z.
+    """An NLP as rows L(z, w) and scores(q(z, w)), where L and q are affine and each w is evaluated at points, whose inputs are affine
+    in z."""
 
-    Attributes
-    ----------
-    points : tuple of Function
-        y -> w for one point: each Function that is evaluated at points.
-    inputs : Function
-        z -> the inputs (size of y, k) at the points of each of these.
-    affine : Function
-        z, each w (size of w, k) -> (L, q), columns.
-    scores : Function
-        q -> (F, the rows of g after L).
-    """
-
-    points: tuple[ca.Function, ...]
-    inputs: ca.Function
-    affine: ca.Function
-    scores: ca.Function
+    points: tuple[ca.Function, ...]  # y -> w for one point: each Function that is evaluated at points
+    inputs: ca.Function  # z -> the inputs (size of y, k) at the points of each of these
+    affine: ca.Function  # z, each w (size of w, k) -> (L, q), columns
+    scores: ca.Function  # q -> (F, the rows of g after L)

@@ -33,26 +33,7 @@ class Reduced(Deriving):
     """The constraints that propagation leaves to satisfy: lower <= values <= upper.
 
     The rows are the final states that are imposed, then all variables that are not free (states), then those constraints of the NLP that
-    propagation does not satisfy.
-
-    Parameters
-    ----------
-    layout : Layout
-    writers : sequence of PhaseWriter
-        In the order of time.
-    peaks : pair of array (p,) and Function
-        Slots of the peaks, and z -> (p,), their values; here and below, z are the variables and the hidden quantities.
-    rest : tuple of Function and arrays (r,)
-        z -> (r,), those constraints; their lower and upper limits and scales.
-    scores : Function and array (r,) of int, optional
-        z -> (F, g), to be evaluated with each propagation, and which of the rows of g are those constraints.
-
-    Attributes
-    ----------
-    lower, upper, scale : arrays (rows,)
-    equation : array (rows,) of bool
-    inside : array (rows,) of bool
-        Whether a row needs the states inside the elements, whose derivatives cost most.
+    propagation does not satisfy. peaks (p,), rest (r,), scores (r,), lower, upper, scale (rows,), equation (rows,), inside (rows,).
     """
 
     def __init__(

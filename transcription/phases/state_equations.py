@@ -15,26 +15,7 @@ ITERATIONS, TOLERANCE = 100, 1e-14
 
 
 class StateEquations:
-    """G(y, e) = 0 for the scaled states y of one phase, where e is the rest of an extended vector.
-
-    Parameters
-    ----------
-    phase : CompiledPhase
-    layout : Layout
-    extended : MX (e, 1)
-        An extended symbol.
-    residual : MX (k nx, 1)
-        Scaled residuals of the rows of dynamics, in that symbol.
-    slots : array (k, nx) of int
-        The states that these rows determine, the final ones among them.
-    final : array (nx,) of int
-        Slots of the final states. Where a value is imposed, a slot is that of a constant, and the state an unknown all the same.
-
-    Raises
-    ------
-    ValueError
-        If there are not as many rows as states.
-    """
+    """G(y, e) = 0 for the scaled states y of one phase, where e is the rest of an extended vector. slots (k, nx), final (nx,)."""
 
     def __init__(
         self, phase: CompiledPhase, layout: Layout, extended: ca.MX, residual: ca.MX, slots: np.ndarray, final: np.ndarray

@@ -129,35 +129,17 @@ class PhaseWriter(ABC):
 
     An implementation puts its variables into the layout when it is made, and has the four abstract methods below. Propagation and its
     derivatives follow from the rows of dynamics, guess and interpolation from the nodes; a method that can do better overrides them.
-
-    Parameters
-    ----------
-    phase : CompiledPhase
-    layout : Layout
-    ends : Ends
-
-    Attributes
-    ----------
-    interior : array of int
-        Slots of the states and hidden quantities that `sensitivity` replaces only on demand.
-    magnitudes : array of int
-        Slots of variables that stand for absolute values: without bounds, and as small as may be once the rest is known.
-    compilable : bool
-        Whether fast propagation, and `sensitivity`, can be written in C.
-    wide : bool
-        Whether `propagate` takes several extended vectors side by side.
-    dense : int
-        About how many derivatives of rows by controls there are because states depend on all controls before them; 0 where it is sparse.
-    affine : bool
-        Whether rows and quantities are affine in the variables and in what `Rows.at_points` returns, whose inputs are affine in the
-        variables, too; steps of periodic controls count as constant. Then derivatives are put together from those at the points.
     """
 
-    interior: np.ndarray = np.empty(0, dtype=int)
+    interior: np.ndarray = np.empty(0, dtype=int)  # slots of the states and hidden quantities that `sensitivity` replaces only on demand
+    # Slots of variables that stand for absolute values: without bounds, and as small as may be once the rest is known.
     magnitudes: np.ndarray = np.empty(0, dtype=int)
-    compilable: bool = False
-    wide: bool = False
+    compilable: bool = False  # whether fast propagation, and `sensitivity`, can be written in C
+    wide: bool = False  # whether `propagate` takes several extended vectors side by side
+    # About how many derivatives of rows by controls there are because states depend on all controls before them; 0 where it is sparse.
     dense: int = 0
+    # Whether rows and quantities are affine in the variables and in what `Rows.at_points` returns, whose inputs are affine in the
+    # variables, too; steps of periodic controls count as constant. Then derivatives are put together from those at the points.
     affine: bool = False
 
     def __init__(self, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
@@ -292,46 +274,12 @@ class PhaseWriter(ABC):
         self.layout.write(extended, slots[between], trajectory.state(trajectory.t0 + length * share[between])[None])
 
     def propagate(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """Propagation from the initial states. By default Newton's method on all rows of dynamics, from constant states.
-
-        Parameters
-        ----------
-        extended : MX (e, 1), or (e, k) if the writer is `wide`
-            An extended symbol, of which the states are to be replaced. What comes back has as many columns.
-        robust : bool
-            To solve the equations of states at any cost; otherwise fast, if need be with a residual.
-
-        Returns
-        -------
-        MX (e, 1)
-            With the states and hidden quantities that the dynamics give.
-        MX (nx, 1)
-            The final states, also where they are imposed and so no variables.
-        MX (any, 1)
-            Scaled residuals of the equations of states, which have to be checked where it is not `robust`.
-        """
+        """Propagation from the initial states. By default Newton's method on all rows of dynamics, from constant states."""
         return self._equations.propagate(extended, self.ends.initial)
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
         """Derivatives of the states of an extended symbol, which are propagated, by the free variables. By default those of the implicit
-        function that the rows of dynamics define.
-
-        Parameters
-        ----------
-        extended : MX (e, 1)
-        S : MX (e, d)
-            Derivatives of the extended vector: the seeds of the layout, with the rows of initial states given. The rows of the other states
-            and of hidden quantities are to be replaced.
-        interior : bool
-            Also inside the elements; otherwise only at their ends.
-
-        Returns
-        -------
-        MX (e, d)
-            With the rows of the states and hidden quantities.
-        MX (nx, d)
-            Of the final states, also where they are imposed.
-        """
+        function that the rows of dynamics define."""
         return self._equations.sensitivity(extended, S)
 
     @cached_property

@@ -15,40 +15,21 @@ CUBIC = 0.5 * (1.0 + lobatto_nodes(4))
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """N steps, linearised.
+    """N steps, linearised."""
 
-    Attributes
-    ----------
-    after, integrals, samples : arrays (N, nx, nx), (N, nq, nx), (N, points, rows, nx)
-        Derivatives, by the states before a step, of the states after it, of its integrals, and of samples at its points, the first of which
-        is its beginning.
-    at_end : array (rows, nx)
-        Those of samples at the end of the last step, by the states there.
-    """
-
+    # after, integrals, samples: (N, nx, nx), (N, nq, nx), (N, points, rows, nx): Derivatives, by the states before a step, of the states
+    # after it, of its integrals, and of samples at its points, the first of which is its beginning.
     after: np.ndarray
     integrals: np.ndarray
     samples: np.ndarray
-    at_end: np.ndarray
+    at_end: np.ndarray  # (rows, nx): Those of samples at the end of the last step, by the states there
 
 
 def backward(
     steps: Steps, final: np.ndarray, weights: np.ndarray, of_samples: np.ndarray, of_end: np.ndarray, falls: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Costates (N, nx) at the beginning of each step, and (N, nx) at its end, before they jump there.
-
-    Parameters
-    ----------
-    steps : Steps
-    final : array (nx,)
-        The multipliers of the equations of the final states.
-    weights : array (nq,)
-        Of the integrals.
-    of_samples, of_end : arrays (N, points, rows), (rows,)
-        Multipliers of the samples.
-    falls : array (N, nx)
-        By how much costates fall at the beginning of each step, besides what samples there make of them.
-    """
+    """Costates (N, nx) at the beginning of each step, and (N, nx) at its end, before they jump there. final (nx,), weights (nq,),
+    of_samples (N, points, rows), of_end (rows,), falls (N, nx)."""
     begin, end = np.empty_like(falls), np.empty_like(falls)
     p = final + of_end @ steps.at_end
     for k in range(len(falls) - 1, -1, -1):

@@ -26,19 +26,13 @@ DEGREES = {"constant": 0, "linear": 1, "spline": 3}
 class ControlLaw:
     """A control by its values at nodes.
 
-    "constant": a value for each interval between two nodes; "linear": straight lines through a value at each node; "spline": the
-    cubic spline through them that has a continuous third derivative at the second node and the last but one (de Boor, "A Practical Guide
-    to Splines", IV: not-a-knot), which may leave the bounds between nodes.
-
-    Parameters
-    ----------
-    kind : "constant", "linear" or "spline"
-    pieces : PhaseMesh
-        What lies between two nodes each: its edges are the nodes, both ends of the phase among them.
+    "constant": a value for each interval between two nodes; "linear": straight lines through a value at each node; "spline": the cubic
+    spline through them that has a continuous third derivative at the second node and the last but one (de Boor, "A Practical Guide to
+    Splines", IV: not-a-knot), which may leave the bounds between nodes.
     """
 
     kind: str
-    pieces: PhaseMesh
+    pieces: PhaseMesh  # what lies between two nodes each: its edges are the nodes, both ends of the phase among them
 
     @property
     def degree(self) -> int:
@@ -68,18 +62,7 @@ class ControlLaw:
     def coefficients(self, U: ca.MX, steps: np.ndarray, phase: CompiledPhase) -> ca.MX:
         """The polynomials on each step: their values at its Gauss-Lobatto nodes ("lobatto" in `polynomials.basis_matrix`).
 
-        Periodic controls follow each other the short way round, beyond their bounds where need be.
-
-        Parameters
-        ----------
-        U : MX (nu, count)
-        steps : array (N + 1,)
-            Where, relative to the phase, steps begin and end that follow each other; no node lies inside one.
-        phase : CompiledPhase
-
-        Returns
-        -------
-        MX (nu, N (degree + 1))
+        Periodic controls follow each other the short way round, beyond their bounds where need be. steps (N + 1,).
         """
         if self.kind == "linear":
             values = ca.horzcat(U[:, :-1], U[:, 1:])

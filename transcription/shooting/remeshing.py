@@ -22,21 +22,7 @@ def next_intervals(
     """The next mesh of one phase.
 
     As many intervals as before follow the density of the trajectory. Where errors ask for more than that, there are more. Where nothing is
-    wrong, there are more everywhere.
-
-    Parameters
-    ----------
-    old : PhaseMesh
-    phase : PhaseTrajectory
-        Found on it, of positive duration.
-    errors, of_controls : arrays (N,)
-        Of its steps; see `Meshed.adapted`.
-    degree : int
-        Of the controls.
-    least : float
-        Least density, in parts of its mean; see `density.raised`.
-    most : int
-        Number of intervals that is not exceeded, but for those that there are.
+    wrong, there are more everywhere. errors, of_controls (N,).
     """
     places, values = trajectory_density(phase)
     right = max(errors.max(initial=0.0), of_controls.max(initial=0.0)) <= 1.0

@@ -17,21 +17,11 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Tableau:
-    """The coefficients of an explicit method of s stages.
-
-    Attributes
-    ----------
-    name : str
-    order : int
-        The global error falls with this power of the step.
-    A : tuple of s tuples
-        Row i has the i coefficients of the stages before stage i.
-    b : tuple of s floats
-    """
+    """The coefficients of an explicit method of s stages."""
 
     name: str
-    order: int
-    A: tuple[tuple[float, ...], ...]
+    order: int  # the global error falls with this power of the step
+    A: tuple[tuple[float, ...], ...]  # row i has the i coefficients of the stages before stage i
     b: tuple[float, ...]
 
     @property
@@ -61,20 +51,7 @@ class Tableau:
         return np.polynomial.polynomial.polyval(z, self.growth)
 
     def step(self, rates: Callable[[float, Any], Any], y: Any, h: Any) -> tuple[Any, list[Any]]:
-        """One step.
-
-        Parameters
-        ----------
-        rates : callable
-            (c, y) -> dy/dt a part c of the step after its beginning.
-        y : array or CasADi matrix
-        h : float or CasADi scalar
-            The step.
-
-        Returns
-        -------
-        new y, and the rates at the stages
-        """
+        """One step."""
         slopes: list[Any] = []
         for c, row in zip(self.c, self.A, strict=True):
             slopes.append(rates(c, moved(y, h, row, slopes)))

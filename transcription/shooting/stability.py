@@ -36,22 +36,7 @@ def check_steps(
     settings: Mapping[str, int],
     own: Collection[str] = (),
 ) -> None:
-    """Raise a ValueError that names the phase, the step, the scheme and what to change, where steps cannot be stable.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    scheme : Tableau
-    places : mapping of arrays (N + 1,)
-        Ends of the steps of each phase, relative to it.
-    prefix : str
-        What the message begins with.
-    settings : mapping
-        The settings that make steps shorter: the first is the number of nodes or intervals, "steps" those between them.
-    own : names
-        Phases whose steps do not follow from the first of these: such are made for a trajectory, which may be far from the guess, so that
-        nothing is certain that is not so in the middle of the states' bounds, too.
-    """
+    """Raise a ValueError that names the phase, the step, the scheme and what to change, where steps cannot be stable. places (N + 1,)."""
     p = np.array([problem.guesses.get(v.name, 0.5 * (v.lower + v.upper)) for v in problem.parameters])
     for phase in problem.phases:
         shares = np.diff(places[phase.name])

@@ -24,24 +24,6 @@ class Step:
 
     Integrals are quadrature states of the same method. A point inside the step is reached by a step of the same method of that part of its
     length, which is as accurate as the step itself.
-
-    Parameters
-    ----------
-    scheme : Tableau
-    degree : int
-        Of the controls on the step.
-    points : sequence of float
-        Where path constraints and peaks are sampled, in [0, 1].
-    phase : CompiledPhase
-
-    Attributes
-    ----------
-    rows : int
-        Number of path constraints and peaks.
-    inputs : int
-        nx + (degree + 1) nu + 2 + len(s): the number of scalar inputs of a step.
-    symbolic : bool
-        Whether the phase can be written as scalar operations and calls, which is several times faster and can be compiled.
     """
 
     def __init__(self, scheme: Tableau, degree: int, points: Sequence[float], phase: CompiledPhase) -> None:

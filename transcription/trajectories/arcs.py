@@ -37,26 +37,14 @@ GRACE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Arcs:
-    """n arcs of one phase, each an element of a trajectory, with controls of one basis and degree.
-
-    Attributes
-    ----------
-    phase : CompiledPhase
-    begins, lengths : arrays (n,)
-        In time.
-    coefficients : array (n, degree + 1, nu)
-        Of the controls.
-    basis : str
-    s : array (n, ns)
-        t0, tf and the parameters of the trajectory.
-    """
+    """n arcs of one phase, each an element of a trajectory, with controls of one basis and degree."""
 
     phase: CompiledPhase
-    begins: np.ndarray
+    begins: np.ndarray  # begins, lengths: (n,): In time
     lengths: np.ndarray
-    coefficients: np.ndarray
+    coefficients: np.ndarray  # (n, degree + 1, nu): Of the controls
     basis: str
-    s: np.ndarray
+    s: np.ndarray  # (n, ns): t0, tf and the parameters of the trajectory
 
     @classmethod
     def of(cls, phase: CompiledPhase, pieces: Sequence[tuple[PhaseTrajectory, int, np.ndarray]]) -> Arcs:
@@ -71,27 +59,7 @@ class Arcs:
         return Arcs(self.phase, self.begins[rows], self.lengths[rows], self.coefficients[rows], self.basis, self.s[rows])
 
     def integrate(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray:
-        """States and integrals along all arcs.
-
-        Parameters
-        ----------
-        y : array (n, ny)
-            States and integrals at their beginnings.
-        rtol : float
-        atol : array (ny,)
-        method : str
-            Of `METHODS`.
-
-        Returns
-        -------
-        array (n, len(DENSE), ny)
-            States and integrals at the local coordinates `DENSE`; NaN where the integration breaks down.
-
-        Raises
-        ------
-        Stopped
-            If the work is to end early, and has been for `GRACE`.
-        """
+        """States and integrals along all arcs. y (n, ny), atol (ny,) -> (n, len(DENSE)."""
         check_stopping(GRACE)
         found = np.full((len(y), len(DENSE), y.shape[1]), np.nan)
         self._calls[0] = 0

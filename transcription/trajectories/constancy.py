@@ -20,16 +20,9 @@ def hamiltonian_variation(problem: CompiledProblem, trajectory: Trajectory, cost
 
     The tenths of the time in which it is least and greatest do not count: there are jumps of costates at limits of states.
 
-    A phase is autonomous where neither its rates, its integrands, its path constraints nor its peaks depend on time. There the
-    Hamiltonian is constant along an optimum, also where limits act (Bryson and Ho, "Applied Optimal Control", 1975, sections 2.3 and 3.8).
-    Its terms are costates times rates, one for each state, and the weighted integrands.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    trajectory : Trajectory
-    costates : Costates
-        Of the trajectory.
+    A phase is autonomous where neither its rates, its integrands, its path constraints nor its peaks depend on time. There the Hamiltonian
+    is constant along an optimum, also where limits act (Bryson and Ho, "Applied Optimal Control", 1975, sections 2.3 and 3.8). Its terms
+    are costates times rates, one for each state, and the weighted integrands.
     """
     parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
     flown = {phase.name: trajectory[phase.name] for phase in problem.phases if _is_autonomous(phase)}

@@ -18,27 +18,15 @@ class PhaseCostates(Mapping[str, np.ndarray]):
     """The costates of one phase by state, at the nodes of its trajectory.
 
     Where they jump they are those just after, and at tf those just before.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The states.
-    at_nodes : array (k, nx)
-        At the nodes of the trajectory.
-    hamiltonian : array (k,)
-        There.
-    polynomial : PiecewisePolynomial
-        The costates between the nodes.
-    error : float or None
-        Of costates that were integrated backward: the largest difference from what the multipliers say at t0, and at the end of
-        each element where these are costates (DFET, Gauss, Radau), as a part of the largest costate, all in scales of their states. None
-        for those that are multipliers themselves, or follow from these exactly.
     """
 
-    names: tuple[str, ...]
-    at_nodes: np.ndarray
-    hamiltonian: np.ndarray
-    polynomial: PiecewisePolynomial
+    names: tuple[str, ...]  # the states
+    at_nodes: np.ndarray  # (k, nx): At the nodes of the trajectory
+    hamiltonian: np.ndarray  # (k,): There
+    polynomial: PiecewisePolynomial  # the costates between the nodes
+    # Of costates that were integrated backward: the largest difference from what the multipliers say at t0, and at the end of each
+    # element where these are costates (DFET, Gauss, Radau), as a part of the largest costate, all in scales of their states. None for
+    # those that are multipliers themselves, or follow from these exactly.
     error: float | None = None
 
     def __repr__(self) -> str:

@@ -48,19 +48,8 @@ def largest_on_elements(
     """The largest scaled excess of each path constraint (N, c), 0 where there is none, and the largest value of each peak (N, p).
 
     What is narrower than the gaps between samples, such as a small obstacle on a long way, is found by its flanks: where the slopes of the
-    samples about the largest one let something exceed a limit, or the peak of the whole phase, the gaps beside it are sampled closer.
-
-    Parameters
-    ----------
-    phase : CompiledPhase
-    state : PiecewisePolynomial
-        The states: simulated ones, or those of the trajectory.
-    trajectory : PhaseTrajectory
-        Whose controls these are.
-    s : array (ns,)
-        Its times and the parameters.
-    paths, peaks : arrays (N, len(DENSE), c), (N, len(DENSE), p)
-        Values at `DENSE` on each element.
+    samples about the largest one let something exceed a limit, or the peak of the whole phase, the gaps beside it are sampled closer. s
+    (ns,), paths, peaks (N, len(DENSE).
     """
     count = len(phase.paths)
     values = np.concatenate([_beyond(paths, phase.paths), peaks], axis=2)
@@ -105,18 +94,7 @@ def _paths_and_peaks_function(phase: CompiledPhase) -> Batched:
 
 
 def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, float]:
-    """Largest excursions of states, controls and path constraints between the nodes, by the transcription's own polynomials.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    trajectory : Trajectory
-
-    Returns
-    -------
-    dict
-        By name ("phase.variable"), in scales of the variable; without those that stay inside.
-    """
+    """Largest excursions of states, controls and path constraints between the nodes, by the transcription's own polynomials."""
     found: dict[str, float] = {}
     parameters = np.array(list(trajectory.parameters.values()))
     for phase in problem.phases:

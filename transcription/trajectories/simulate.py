@@ -75,24 +75,6 @@ def simulate(
     """The simulation of a trajectory's controls, phase after phase, by an integrator of scipy.
 
     Each phase starts where the phases linked to it ended in this simulation; what is not linked starts where the trajectory does.
-
-    Parameters
-    ----------
-    problem : CompiledProblem
-    trajectory : Trajectory
-    rtol, atol : float
-        Of the integrator; `atol` in spans of the states' bounds.
-    method : str
-        Of `scipy.integrate.solve_ivp`; "Radau" or "LSODA" for stiff dynamics.
-
-    Returns
-    -------
-    Simulation
-
-    Raises
-    ------
-    ValueError
-        For an unknown method or a tolerance that is not positive.
     """
     return simulate_all(problem, [trajectory], rtol=rtol, atol=atol, method=method)[0]
 

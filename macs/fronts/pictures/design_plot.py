@@ -23,17 +23,6 @@ def draw_designs(front: Any, title: str, figure: Any = None, marked: Sequence[in
     """Axes, one for each variable, with its values over the first objective of all points.
 
     Dashed lines are its bounds. Colours are the second objective, if there is one. Points that are not feasible or not verified are hollow.
-
-    Parameters
-    ----------
-    front : Points
-        Of a vector problem or black box.
-    title : str
-        Text above the panels.
-    figure : matplotlib Figure, optional
-        Empty figure to draw into. Default: a new one.
-    marked : numbers of points
-        Points that are circled.
     """
     import matplotlib
 

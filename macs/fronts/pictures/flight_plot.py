@@ -41,20 +41,11 @@ PANEL = (3.6, 1.75)
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A trajectory in a panel.
-
-    Attributes
-    ----------
-    trajectory : Trajectory
-    color : str
-        Of all its phases, the ends of which are dots then. Default: a colour for each phase, and dots at nodes.
-    hollow : bool
-        Whether the dots at nodes are hollow, and drawn in any case: of a trajectory that is not verified.
-    """
+    """A trajectory in a panel."""
 
     trajectory: Trajectory
-    color: str = ""
-    hollow: bool = False
+    color: str = ""  # of all its phases, the ends of which are dots then. Default: a colour for each phase, and dots at nodes.
+    hollow: bool = False  # whether the dots at nodes are hollow, and drawn in any case: of a trajectory that is not verified
 
 
 def draw_flight(
@@ -67,18 +58,6 @@ def draw_flight(
     Dashed lines are bounds and limits, if they are not too far from the values; the text above each panel always gives them. A constant is
     drawn within its bounds, or on a range about it. Costates and the Hamiltonian are of the sum of the objectives times their weights,
     which are above the latter.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    title : str
-        Text above the panels.
-    figure : matplotlib Figure, optional
-        Empty figure to draw into. Default: a new one.
-    costates : Costates, optional
-        Of the trajectory.
-    hollow : bool
-        Whether the dots are hollow: of a trajectory that is not verified.
     """
     import matplotlib
 
@@ -204,14 +183,7 @@ def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def draw_panel(ax: Any, drawn: Sequence[Drawn], name: str, kind: str) -> None:
-    """Draw a quantity of `quantities` of one trajectory or several over time, with its limits, label, and bounds as text.
-
-    Parameters
-    ----------
-    ax : Axes
-    drawn : sequence of Drawn
-    name, kind : str
-    """
+    """Draw a quantity of `quantities` of one trajectory or several over time, with its limits, label, and bounds as text."""
     values: list[np.ndarray] = []
     held: dict[tuple[float, float], list[PhaseTrajectory]] = {}
     owners: list[Variable | Limit] = []

@@ -84,16 +84,6 @@ def draw_front(front: Any, ax: Axes | None = None, marked: Sequence[int] = (), b
     One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
     Axes), more as parallel coordinates. Points that did not converge, and those that a simulation did not confirm, are hollow or broken
     lines; none of them is marked as best.
-
-    Parameters
-    ----------
-    front : Any
-    ax : Axes, optional
-        Axes to draw into. Default: those of a new figure.
-    marked : numbers of points
-        Points to mark, a colour each, the same as in a picture of their trajectories. Default: of two objectives, the best of each.
-    beside : mapping, optional
-        Name -> two objectives (k, 2) of other points, in the user's units and senses.
     """
     import matplotlib
 

@@ -13,12 +13,7 @@ NOT_VERIFIED, NOT_FEASIBLE, NOT_SIMULATED = "not verified", "not feasible", "not
 
 
 def kinds(front: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Masks (n,) of the points that are drawn in full, of those that were simulated and are not verified, and of those not feasible.
-
-    Parameters
-    ----------
-    front : Points
-    """
+    """Masks (n,) of the points that are drawn in full, of those that were simulated and are not verified, and of those not feasible."""
     feasible = front.status == CONVERGED
     apart = feasible & front.was_simulated & ~front.verified
     return feasible & ~apart, apart, ~feasible

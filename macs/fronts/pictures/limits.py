@@ -19,19 +19,7 @@ Limits = tuple[tuple[float, float] | None, float, float]
 
 
 def draw_limits(ax: Any, values: np.ndarray, limits: Sequence[Limits], reach: float = 1.0, margin: float = 0.06) -> None:
-    """Set the vertical range of axes and draw dashed lines at limits in it.
-
-    Parameters
-    ----------
-    ax : Axes
-    values : array
-        What is drawn. Those that are not finite are left out.
-    limits : sequence of Limits
-        Lines are drawn at those that are at most `reach` ranges of the values away from them. The values of a constant have no range: then
-        the whole span of the limits is shown if both are finite and it is not too wide, else a tenth of the constant on both sides.
-    reach, margin : float
-        In ranges of the values.
-    """
+    """Set the vertical range of axes and draw dashed lines at limits in it."""
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
     spans = [upper - lower for _, lower, upper in limits if np.isfinite(upper - lower)]

@@ -14,12 +14,7 @@ MOST = 24
 
 
 def point_html(point: Any) -> str:
-    """HTML of a point: a row for each objective, as found and as simulated, and its states, controls and path constraints over time.
-
-    Parameters
-    ----------
-    point : Point
-    """
+    """HTML of a point: a row for each objective, as found and as simulated, and its states, controls and path constraints over time."""
     simulated = point.simulated
     heads = ["objective", "", "value", *(["simulated"] if simulated is not None else [])]
     rows = [

@@ -17,18 +17,6 @@ def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
 
     Dashed lines are bounds and limits, as of one trajectory alone. A dot is the end of a phase that another one follows. Nodes are hollow
     dots where a trajectory is not verified. Shorter trajectories are above longer ones. The legend has each point's number and objectives.
-
-    Parameters
-    ----------
-    points : Points of one front
-        At least one, and at most as many as there are colours.
-    figure : matplotlib Figure, optional
-        Empty figure to draw into. Default: a new one.
-
-    Raises
-    ------
-    ValueError
-        If there are none or too many, or one has no trajectory.
     """
     import matplotlib
     from matplotlib.lines import Line2D

@@ -34,20 +34,12 @@ DEEP, PANEL = 60.0, 12.0
 
 @dataclass(frozen=True)
 class FuzzyFunction:
-    """A preference function with fuzzy boundaries: its mean over [J - 3 spread, J + 3 spread] under a Gaussian exp(-(t / spread)^2).
-
-    Attributes
-    ----------
-    crisp : PreferenceFunction
-    spread : float
-        In the objective's unit.
-    printed : bool
-        Whether the Gaussian is centred at the boundary that is nearest to J, as eq. (35) is printed, instead of J. That function jumps
-        half-way between boundaries.
-    """
+    """A preference function with fuzzy boundaries: its mean over [J - 3 spread, J + 3 spread] under a Gaussian exp(-(t / spread)^2)."""
 
     crisp: PreferenceFunction
-    spread: float
+    spread: float  # in the objective's unit
+    # Whether the Gaussian is centred at the boundary that is nearest to J, as eq. (35) is printed, instead of J. That function jumps
+    # half-way between boundaries.
     printed: bool = False
 
     def __call__(self, J: Operand) -> Operand:

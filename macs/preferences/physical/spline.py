@@ -39,14 +39,7 @@ def levels(beta: float, count: int) -> np.ndarray:
 def slopes(z: np.ndarray, lengths: np.ndarray, flat: bool) -> tuple[np.ndarray, bool]:
     """Slopes s_1, ..., s_5 at the boundaries, and whether each range is steeper than the slope at its begin.
 
-    Only then there is a convex spline, and it is convex by construction.
-
-    Parameters
-    ----------
-    z, lengths : array (5,), array (4,)
-        Values at the boundaries, lengths of the ranges between them.
-    flat : bool
-        Whether the function is least at the first boundary.
+    Only then there is a convex spline, and it is convex by construction. z, lengths (5,).
     """
     mean = np.diff(z) / lengths
     found = [0.0 if flat else STEEPNESS * float(mean[0])]
@@ -59,13 +52,7 @@ def slopes(z: np.ndarray, lengths: np.ndarray, flat: bool) -> tuple[np.ndarray, 
 
 
 def raised_beta(classes: Sequence[ObjectiveClass], beta: float) -> float:
-    """The first of beta, 1.1 beta, 1.21 beta, ... for which the preference functions of all objectives are convex on each side.
-
-    Raises
-    ------
-    ValueError
-        If lengths of ranges differ so much that there is none below 1e12.
-    """
+    """The first of beta, 1.1 beta, 1.21 beta, ... for which the preference functions of all objectives are convex on each side."""
     while beta <= MOST:
         z = levels(beta, len(classes))
         if all(slopes(z, side.lengths, len(one.sides) > 1)[1] for one in classes for side in one.sides):
@@ -143,24 +130,14 @@ class Piece:
 
 @dataclass(frozen=True)
 class PreferenceFunction:
-    """The preference function of one objective: z_k at each boundary J_k, convex on each side, once continuously differentiable, positive.
-
-    Attributes
-    ----------
-    of : ObjectiveClass
-    z, beta : array (5,), float
-        Values at the boundaries, and the beta of their steps.
-    pieces : tuple of Piece
-        In increasing order, without gaps.
-    boundaries : tuple of (J, z)
-        In increasing order of J.
-    """
+    """The preference function of one objective: z_k at each boundary J_k, convex on each side, once continuously differentiable,
+    positive."""
 
     of: ObjectiveClass
-    z: np.ndarray
+    z: np.ndarray  # z, beta: (5,): Values at the boundaries, and the beta of their steps
     beta: float
-    pieces: tuple[Piece, ...]
-    boundaries: tuple[tuple[float, float], ...]
+    pieces: tuple[Piece, ...]  # in increasing order, without gaps
+    boundaries: tuple[tuple[float, float], ...]  # in increasing order of J
 
     def __call__(self, J: Operand) -> Operand:
         """The preference of values J, for numbers, arrays and symbols."""

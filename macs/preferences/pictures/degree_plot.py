@@ -23,24 +23,7 @@ def draw_degrees(
     title: str = "",
     ax: Axes | None = None,
 ) -> Axes:
-    """Axes with groups of bars, usually one for each objective, with one bar for each choice.
-
-    Parameters
-    ----------
-    degrees : dict
-        Degrees (m,) by name of the choice, which the legend shows; NaN for an objective that does not enter.
-    groups : m texts
-        Below the groups.
-    label : str
-        Of the vertical axis.
-    levels : sequence of (degree, word)
-        Marks on the right.
-    smaller : bool
-        Whether smaller degrees are better, as in physical programming; then ranges of preference are shaded.
-    title : str
-    ax : Axes, optional
-        Default: those of a new figure.
-    """
+    """Axes with groups of bars, usually one for each objective, with one bar for each choice."""
     import matplotlib
 
     values = np.array([*degrees.values()], dtype=float)

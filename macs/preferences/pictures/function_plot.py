@@ -18,50 +18,23 @@ SAMPLES = 801
 
 @dataclass(frozen=True)
 class Curve:
-    """A function of one objective.
-
-    Attributes
-    ----------
-    goal, place : Objective and its place
-    functions : tuple of (label, callable)
-        The first one is drawn in full, with the points; the others are broken lines.
-    low, high : float
-        Between which it is drawn.
-    boundaries : tuple of float
-        Between ranges of preference; shaded by `degree`.
-    degree : callable, optional
-    directed : bool
-        Whether the objective's sense says what is better.
-    """
+    """A function of one objective."""
 
     goal: Objective
     place: int
+    # The first one is drawn in full, with the points; the others are broken lines.
     functions: tuple[tuple[str, Callable[[np.ndarray], np.ndarray]], ...]
-    low: float
+    low: float  # low, high: Between which it is drawn
     high: float
-    boundaries: tuple[float, ...] = ()
+    boundaries: tuple[float, ...] = ()  # between ranges of preference; shaded by `degree`
     degree: Callable[[np.ndarray], np.ndarray] | None = None
-    directed: bool = True
+    directed: bool = True  # whether the objective's sense says what is better
 
 
 def draw_functions(
     curves: Sequence[Curve], title: str, heights: str, logarithmic: bool, points: np.ndarray, best: int | None, figure: Any = None
 ) -> np.ndarray:
-    """Axes, one for each objective, with functions of it, the points (n, m) of a front on them, and the best of these marked.
-
-    Parameters
-    ----------
-    curves : sequence of Curve
-    title, heights : str
-        Of the figure, and of the vertical axes.
-    logarithmic : bool
-        Whether these are logarithmic.
-    points : array (n, m)
-    best : int or None
-        Row of the point that is marked.
-    figure : Figure, optional
-        Default: a new one.
-    """
+    """Axes, one for each objective, with functions of it, the points (n, m) of a front on them, and the best of these marked."""
     import matplotlib
 
     with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]

@@ -19,18 +19,7 @@ EDGES = (GREY, COLORS[0])
 def draw_ranking(front: Any, order: np.ndarray, apart: Mapping[str, np.ndarray], title: str, ax: Axes | None = None) -> Axes:
     """Axes with the objectives of a front, its points coloured by their place in an order: dark is good.
 
-    One objective is drawn against the place, two as a scatter plot, more as parallel coordinates. The best point is marked.
-
-    Parameters
-    ----------
-    front : Points
-    order : array (n,)
-        Rows of the front, best first.
-    apart : dict
-        Masks (n,) of points that are hollow, or broken lines, by what the legend says of them.
-    title : str
-    ax : Axes, optional
-        Default: those of a new figure.
+    One objective is drawn against the place, two as a scatter plot, more as parallel coordinates. The best point is marked. order (n,).
     """
     import matplotlib
 

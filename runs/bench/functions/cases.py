@@ -25,29 +25,16 @@ DENSE = 8
 
 @dataclass(frozen=True)
 class Function:
-    """A function to be minimised.
-
-    Attributes
-    ----------
-    name : str
-    problem : callable
-        () -> the arguments of `minimize`: a pymoo problem, or a function and its bounds.
-    objectives, evaluations : int
-    points : int
-        Of the archive, and of each rival's population.
-    front : callable, optional
-        () -> points (k, m) of the true front. Without it, what is non-dominated among all that was found gives the ranges.
-    distance : callable, optional
-        F (k, m) -> (k,): how far points are from the true front, in closed form.
-    """
+    """A function to be minimised."""
 
     name: str
-    problem: Callable[[], tuple[Any, ...]]
+    problem: Callable[[], tuple[Any, ...]]  # () -> the arguments of `minimize`: a pymoo problem, or a function and its bounds
     objectives: int
     evaluations: int
-    points: int
+    points: int  # of the archive, and of each rival's population
+    # () -> points (k, m) of the true front. Without it, what is non-dominated among all that was found gives the ranges.
     front: Callable[[], np.ndarray] | None = None
-    distance: Callable[[np.ndarray], np.ndarray] | None = None
+    distance: Callable[[np.ndarray], np.ndarray] | None = None  # F (k, m) -> (k,): how far points are from the true front, in closed form
 
     def stated(self) -> CompiledVectorProblem:
         """The problem as studies take it."""

@@ -54,15 +54,7 @@ def place(keep: str | None) -> Iterator[Path]:
 
 
 def search(batch: Study, folder: Path, jobs: int, only: Sequence[str] | None = None) -> None:
-    """Make the searches that a study's folder lacks, of all solvers or only some.
-
-    Raises
-    ------
-    RuntimeError
-        Some failed.
-    KeyboardInterrupt
-        Ctrl-C; the same again goes on.
-    """
+    """Make the searches that a study's folder lacks, of all solvers or only some."""
     others = sorted(one.name for one in folder.parent.glob(f"{folder.name[:-DIGITS]}*") if one != folder)
     if others and not folder.exists():
         print(f"{batch.name}: searches in {', '.join(others)} are of other code, and are not used", file=sys.stderr)

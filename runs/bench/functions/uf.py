@@ -24,15 +24,9 @@ EPSILON = 0.1
 
 @dataclass(frozen=True)
 class UF:
-    """One of the functions.
+    """One of the functions."""
 
-    Parameters
-    ----------
-    kind : int
-        1 to 10.
-    """
-
-    kind: int
+    kind: int  # 1 to 10
 
     @property
     def objectives(self) -> int:

@@ -14,13 +14,7 @@ DEEPEST, WHERE = 0.25, 0.28
 
 
 def solved(ballistic: float, passage: Passage, nodes: int, tolerance: float) -> tuple[float, float, float]:
-    """Lift, entry angle, rad, and arc of a ballistic coefficient, kg/m2, from the guess of our own solver on so many nodes.
-
-    Raises
-    ------
-    RuntimeError
-        It did not converge.
-    """
+    """Lift, entry angle, rad, and arc of a ballistic coefficient, kg/m2, from the guess of our own solver on so many nodes."""
     k, pull, drag = passage.stretch, passage.pull, float(passage.drag(np.array(ballistic)))
     # Without copies: arrays are filled in place.
     ends = np.zeros((5, 3)), np.zeros((5, 3)), np.zeros((5, 2))

@@ -33,26 +33,13 @@ HANDLING = {"SF": "feasible-first", "PF": "penalty", "MOCH": "objective"}
 
 @dataclass(frozen=True)
 class Growing:
-    """A run at several sizes.
+    """A run at several sizes."""
 
-    Attributes
-    ----------
-    name, unit : str
-        What is searched, and what is counted.
-    paper : str
-        The order of the paper, in which Np is the population, Nk the nodes, I the constraints and M the objectives.
-    power : float
-        The largest power of the size in it, logarithms left out.
-    prepare : callable
-        Size -> a function of the number of generations that runs them.
-    sizes, quick : tuple of int
-    """
-
-    name: str
+    name: str  # name, unit: What is searched, and what is counted
     unit: str
-    paper: str
-    power: float
-    prepare: Callable[[int], Callable[[int], object]]
+    paper: str  # the order of the paper, in which Np is the population, Nk the nodes, I the constraints and M the objectives
+    power: float  # the largest power of the size in it, logarithms left out
+    prepare: Callable[[int], Callable[[int], object]]  # size -> a function of the number of generations that runs them
     sizes: tuple[int, ...]
     quick: tuple[int, ...]
 

@@ -28,21 +28,13 @@ WIDTH = 200
 
 @dataclass(frozen=True)
 class Series:
-    """A piece of work at several sizes.
+    """A piece of work at several sizes."""
 
-    Attributes
-    ----------
-    name, unit : str
-        What is done, and what is counted.
-    prepare : callable
-        A size -> the work, a function without arguments that is called once.
-    sizes, quick : tuple of int
-        Those of the whole and of the quick benchmark, increasing; the fit is over the last three. No quick ones: it is not in that.
-    """
-
-    name: str
+    name: str  # name, unit: What is done, and what is counted
     unit: str
-    prepare: Callable[[int], Work]
+    prepare: Callable[[int], Work]  # A size -> the work, a function without arguments that is called once
+    # sizes, quick: Those of the whole and of the quick benchmark, increasing; the fit is over the last three. No quick ones: it is not in
+    # that.
     sizes: tuple[int, ...]
     quick: tuple[int, ...]
 

@@ -12,13 +12,7 @@ from .source import Stamp, stamp_of
 
 
 class CachedStore(Store):
-    """As `Store`; the same run is the same object as long as its front and its record are the same files.
-
-    Attributes
-    ----------
-    stamps : {(folder of a cell, number): stamps of front and record}
-        Of the runs as they were read last.
-    """
+    """As `Store`; the same run is the same object as long as its front and its record are the same files."""
 
     def __init__(self, path: Path, definition: Mapping[str, Any], trust: bool = False) -> None:
         super().__init__(path, definition, trust)

@@ -17,13 +17,7 @@ SUFFIX = ".nc"
 
 
 class FrontsSource(Source):
-    """One front, or all fronts of a folder, compared where they are of the same problem.
-
-    Raises
-    ------
-    ValueError
-        The file is no front; there is neither such a file nor a folder with fronts.
-    """
+    """One front, or all fronts of a folder, compared where they are of the same problem."""
 
     def __init__(self, path: str | PathLike[str]) -> None:
         self._path, self.title = Path(path), Path(path).resolve().name

@@ -16,14 +16,7 @@ SHARE = 10.0
 
 
 class Measuring:
-    """Indicators, attainment surfaces, convergence and tables of the finished runs.
-
-    Attributes
-    ----------
-    resource : Resource
-        Plain data: {"comparisons": {name: as `study_page` has it}, "tables": of several comparisons together, "finished": of how many
-        runs it is, "trouble": why there is none}.
-    """
+    """Indicators, attainment surfaces, convergence and tables of the finished runs."""
 
     def __init__(self) -> None:
         self.resource = Resource.of({"comparisons": {}, "tables": [], "finished": 0, "trouble": ""})

@@ -52,27 +52,7 @@ def source_of(path: Path, trust: bool = False) -> Source:
 
 
 class Server(ThreadingHTTPServer):
-    """A server of one source.
-
-    Parameters
-    ----------
-    source : Source
-    host : str
-        The address that it is bound to.
-    port : int
-        0: any that is free.
-
-    Attributes
-    ----------
-    url : str
-    local : bool
-        Whether only this machine can reach it.
-
-    Raises
-    ------
-    ValueError
-        The address is not known, or the port cannot be had, or plotly is not installed.
-    """
+    """A server of one source."""
 
     daemon_threads = True
 

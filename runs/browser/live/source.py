@@ -60,31 +60,17 @@ class Resource:
 
 @dataclass(frozen=True)
 class View:
-    """What one reading of the files gave.
+    """What one reading of the files gave."""
 
-    Attributes
-    ----------
-    status : mapping
-        Plain data, which change often.
-    resources : {name: Resource}
-        "data": as `front_page` and `study_page` have them, but for the measures of a comparison; "going": the points so far of runs that
-        have not ended.
-    fronts : {block: Front}
-        Of the runs in the data.
-    """
-
-    status: Mapping[str, Any]
+    status: Mapping[str, Any]  # plain data, which change often
+    # "data": as `front_page` and `study_page` have them, but for the measures of a comparison; "going": the points so far of runs that
+    # have not ended.
     resources: Mapping[str, Resource]
-    fronts: Mapping[str, Front] = field(default_factory=dict)
+    fronts: Mapping[str, Front] = field(default_factory=dict)  # of the runs in the data
 
 
 class Source(ABC):
-    """What a server shows: looked at again and again, but only while a page asks for it.
-
-    Attributes
-    ----------
-    title : str
-    """
+    """What a server shows: looked at again and again, but only while a page asks for it."""
 
     title: str
 

@@ -53,20 +53,7 @@ class Sampled:
 
 
 class StudySource(Source):
-    """A study's folder.
-
-    Parameters
-    ----------
-    folder : path
-    trust : bool
-        Whether addresses in its files may be loaded that are not in the catalogue: that runs the code they name. Without, points are shown
-        all the same, but solvers are not compared where that needs the problem.
-
-    Raises
-    ------
-    ValueError
-        It contains no study, or cannot be read.
-    """
+    """A study's folder."""
 
     def __init__(self, folder: str | PathLike[str], trust: bool = False) -> None:
         self._store = CachedStore.open(folder, trust)

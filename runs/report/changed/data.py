@@ -53,23 +53,13 @@ def check(nominal: Any, problems: Mapping[str, CompiledProblem | CompiledVectorP
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """The result of one solver on one transcription.
+    """The result of one solver on one transcription."""
 
-    Attributes
-    ----------
-    transcription, solver : str
-        Labels.
-    found : problem -> Front
-        The union of all runs, of the nominal problem first.
-    simulated : problem -> Front
-        Up to `MANY` representative points of the nominal front, as simulated under the data of each problem, in one order; of the nominal
-        problem first. Empty if there is no nominal front or its problem cannot be loaded; `note` gives the reason.
-    note : str
-    """
-
-    transcription: str
+    transcription: str  # transcription, solver: Labels
     solver: str
-    found: Mapping[str, Front]
+    found: Mapping[str, Front]  # the union of all runs, of the nominal problem first
+    # Up to `MANY` representative points of the nominal front, as simulated under the data of each problem, in one order; of the nominal
+    # problem first. Empty if there is no nominal front or its problem cannot be loaded; `note` gives the reason.
     simulated: Mapping[str, Front] = field(default_factory=dict)
     note: str = ""
 

@@ -36,13 +36,7 @@ LOOKS: Sequence[Mapping[str, Any]] = (
 
 
 def settings_of(given: Any, address: str) -> Any:
-    """The dispersions that a study states, for a case: see `references.module_of`.
-
-    Raises
-    ------
-    ValueError
-        The case has none, or a setting is unknown or wrong.
-    """
+    """The dispersions that a study states, for a case: see `references.module_of`."""
     place = address.rpartition(":")[0]
     case = module_of(address) if address and not place.endswith(".py") else None
     kind = getattr(case, "Dispersions", None)
@@ -65,24 +59,13 @@ def check(given: Any, problems: Mapping[str, CompiledProblem | CompiledVectorPro
 
 @dataclass(frozen=True, eq=False)
 class DispersedFront:
-    """Points of the front of one solver under dispersions.
+    """Points of the front of one solver under dispersions."""
 
-    Attributes
-    ----------
-    name, solver : str
-        Of the comparison, and of the solver; the points are of all its runs together.
-    points : Front
-        n points that stand for the front.
-    settings : Any
-        The dispersions, of the case's own kind.
-    measures : {way: n mappings {(name, unit): value}}
-        Of the nominal case first, then of all cases, for each way to fly them.
-    """
-
-    name: str
+    name: str  # name, solver: Of the comparison, and of the solver; the points are of all its runs together
     solver: str
-    points: Front
-    settings: Any
+    points: Front  # n points that stand for the front
+    settings: Any  # the dispersions, of the case's own kind
+    # Of the nominal case first, then of all cases, for each way to fly them.
     measures: Mapping[str, Sequence[Mapping[tuple[str, str], float | None]]]
 
     def tables(self) -> dict[str, Table]:

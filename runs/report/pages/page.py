@@ -33,26 +33,7 @@ DOTS = 100
 
 
 class Page:
-    """A page of a study, and its pictures beside it: NAME.md and NAME-FIGURE.png.
-
-    Parameters
-    ----------
-    path : path
-        Of the page.
-    command : str
-        That makes it.
-    file : path
-        The study file.
-    definition : mapping
-        As of `Study.definition`, of that file.
-
-    Raises
-    ------
-    ValueError
-        The name is not that of a page, or the command cannot be in its header.
-    OSError
-        The page cannot be written, or the study file not be read.
-    """
+    """A page of a study, and its pictures beside it: NAME.md and NAME-FIGURE.png."""
 
     def __init__(self, path: str | PathLike[str], command: str, file: str | PathLike[str], definition: Mapping[str, Any]) -> None:
         self.path = Path(path)
