@@ -69,7 +69,7 @@ def problem(*, arrival_speed: float = ARRIVAL_SPEED, exit_speed: float = EXIT_SP
 
 
 def reference() -> np.ndarray:
-    """The front (k, 2): inverse packing efficiency, 1/m2, and TPS mass fraction, %; by `python -m runs.truths.aerocapture`.
+    """The front (k, 2): inverse packing efficiency, 1/m2, and TPS mass fraction, %; by `python tests/truths/aerocapture.py`.
 
     Slender capsules, a jump, and blunt ones.
     """

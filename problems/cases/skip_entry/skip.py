@@ -110,5 +110,5 @@ def _guess(problem: Problem, lowest: float, mass: float) -> None:
 
 
 def reference() -> np.ndarray:
-    """The front (k, 2): terminal mass, kg, and terminal speed, m/s; by `python -m runs.truths.skip_entry skip`."""
+    """The front (k, 2): terminal mass, kg, and terminal speed, m/s; by `python tests/truths/skip_entry.py skip`."""
     return np.loadtxt(Path(__file__).with_name("skip.csv"), delimiter=",", ndmin=2)

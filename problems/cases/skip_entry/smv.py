@@ -122,5 +122,5 @@ def problem(
 
 def reference() -> np.ndarray:
     """The front (k, 4): flight time, s, heat load, kBtu/ft2, terminal speed, m/s, and terminal mass, kg; how it was found is in the file.
-    `python -m runs.truths.skip_entry smv` makes one by gradients alone."""
+    `python tests/truths/skip_entry.py smv` makes one by gradients alone."""
     return np.loadtxt(Path(__file__).with_name("smv.csv"), delimiter=",", ndmin=2)

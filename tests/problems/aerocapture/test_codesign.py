@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from truths.two_steps import one_step, two_steps
 from vectors import cross, norm
 
 from macs import MACS, optimize
@@ -19,7 +20,6 @@ from problems.cases.aerocapture.designs import BOUNDS, judged, shapes_of
 from problems.cases.aerocapture.passage import passages
 from problems.cases.aerocapture.printed import TABLE_2
 from problems.cases.aerocapture.shape import sized
-from runs.truths.two_steps import one_step, two_steps
 from transcription import stated
 
 MU, RADIUS, HEIGHT, DENSITY, MASS = 4.2828e13, 3390.7e3, 8.92e3, 3.17e-7, 946.0
@@ -261,7 +261,7 @@ def test_every_point_of_a_front_flown_again():
 @pytest.mark.parametrize(("solution", "share"), [(1, 0.97), (2, 0.96), (5, 0.96)])
 def test_the_two_step_design_is_dominated(solution, share):
     """Two steps: a published shape, slender (1) or blunt, then its bank profile with the heat shield of its constant bank. One step is
-    better by `share` in each objective; `python -m runs.truths.two_steps` prints by how much."""
+    better by `share` in each objective; `python tests/truths/two_steps.py` prints by how much."""
     beside, profile = two_steps(solution)
     assert profile.status == "converged" and profile.verified
     assert beside["TPS mass fraction"] <= judged(np.array([TABLE_2[solution].design])).shield[0] * (1 + 1e-5)

@@ -1,6 +1,6 @@
 """Reference fronts of the skip entries by gradients: the program that made the tables beside the cases.
 
-    python -m runs.truths.skip_entry skip|smv [--points 36] [--out FILE.csv]
+    python tests/truths/skip_entry.py skip|smv [--points 36] [--out FILE.csv]
 
 A sweep on the case's own mesh between the ends of the front; points that a simulation does not confirm are left out.
 """
@@ -22,7 +22,7 @@ def text(name: str, front: Front) -> str:
     """The table of a case as text, with a header: its verified points alone."""
     rows = [",".join(f"{value:.7g}" for value in point.simulated.values()) for point in front if point.verified and point.simulated]
     titles = ", ".join(f"{objective} {unit}" for objective, unit in zip(front.names, front.units, strict=True))
-    head = [f"# {name}: front by gradients; made by: python -m runs.truths.skip_entry {name}", f"# {titles}, as simulated"]
+    head = [f"# {name}: front by gradients; made by: python tests/truths/skip_entry.py {name}", f"# {titles}, as simulated"]
     return "\n".join([*head, *rows]) + "\n"
 
 

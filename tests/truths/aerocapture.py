@@ -1,6 +1,6 @@
 """Reference front of `aerocapture` by searches and by gradients: the program that made the table beside the case.
 
-    python -m runs.truths.aerocapture [--evaluations 200000] [--points 400] [--out FILE.csv]
+    python tests/truths/aerocapture.py [--evaluations 200000] [--points 400] [--out FILE.csv]
 
 Searches of 100 times the paper's budget find the branches. Then the least heat shield is sought for many values of the inverse packing
 efficiency, with its two parts and the lift over drag as smooth limits, from the nearest points that are known.
@@ -108,7 +108,7 @@ def main() -> None:
     rows = front(given.evaluations, given.points)
     lines = [",".join(f"{value:.9g}" for value in row) for row in rows]
     head = [
-        "# aerocapture: front by searches and gradients; made by: python -m runs.truths.aerocapture",
+        "# aerocapture: front by searches and gradients; made by: python tests/truths/aerocapture.py",
         "# inverse packing efficiency 1/m2, TPS mass fraction %, " + ", ".join(f"{name} {unit}" for name, unit in coupled.VARIABLES),
     ]
     beside = Path(coupled.__file__).with_name("front.csv")

@@ -1,6 +1,6 @@
 """The two-step designs of the aerocapture paper beside designs in one step that are better in every objective.
 
-    python -m runs.truths.two_steps [--solutions 1 2 3 4 5]
+    python tests/truths/two_steps.py [--solutions 1 2 3 4 5]
 
 Two steps: the shape that the paper prints, then the bank profile of least delta v for it, with the heat shield of its constant bank as the
 limit. One step: shape and bank profile together, as much better as can be by the same share of all three objectives.
@@ -48,7 +48,7 @@ def one_step(solution: int, beside: dict[str, float]) -> Point:
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Print a row of the table for each solution as it is found."""
-    parser = argparse.ArgumentParser(prog="python -m runs.truths.two_steps", description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = argparse.ArgumentParser(prog="python tests/truths/two_steps.py", description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--solutions", type=int, nargs="+", choices=sorted(TABLE_2), default=sorted(TABLE_2))
     print("solution         by  eta 1/m2   TPS %  delta v m/s  verified")
     for solution in parser.parse_args(argv).solutions:

@@ -1,6 +1,6 @@
 """Reference fronts of the re-entry cases by gradients: the program that made the tables beside the cases.
 
-    python -m runs.truths reentry_case1 [--points 120] [--out FILE.csv]
+    python tests/truths/reentry.py reentry_case1 [--points 120] [--out FILE.csv]
 
 Each point is a solve from a place between the ends of the front straight down to it (Pascoletti and Serafini 1984), on a fine mesh with
 controls that are linear on each element, with limits a little narrower than the case's own. Its controls, rounded as in the table, are
@@ -241,7 +241,7 @@ def united(rows: list[np.ndarray]) -> np.ndarray:
 def text(case: str, rows: np.ndarray) -> str:
     """The table as text, with a header."""
     head = [
-        f"{case}: front by gradients, each row a flight; made by: python -m runs.truths {case}",
+        f"{case}: front by gradients, each row a flight; made by: python tests/truths/reentry.py {case}",
         f"Solved on {METHOD}, limits times {NARROWER:g}, tolerances at the end times {NEARER:g};",
         "simulated by DOP853 with the commands of the row, which exceeds no limit of the case by more than 1 %.",
         "Columns: cross-range deg, heat load kBtu/ft2, oscillation rad, peak heating rate Btu/ft2/s; then, in degrees, the commands of",
@@ -271,3 +271,7 @@ def main() -> None:
     print(f"{given.case}: {len(rows)} points, hypervolume {volume:.1f} in the paper's units, from the paper's corner")
     for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):
         print(f"  best objective {k + 1}: {np.round(row, 4).tolist()}")
+
+
+if __name__ == "__main__":
+    main()

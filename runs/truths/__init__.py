@@ -1,1 +1,0 @@
-"""Reference fronts, made by long computations."""
