@@ -2,7 +2,7 @@
 page, its pictures and the index; `--check` only says which are out of date; names of scripts run these in any case.
 
 A script begins with a docstring, the title and the text of its page, and ends with the comment "What was learned". Whatever it prints, and
-all its figures, are shown in between. A page is out of date once its code, or the files that state its problem, are others than when it was
+all its figures, are shown in between. A page is out of date once its code, or its problem (by its fingerprint), is another than when it was
 made; where only words are others, the results stay.
 """
 
@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import ast
 import contextlib
-import inspect
 import io
 import os
 import re
@@ -20,9 +19,9 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,7 @@ from scipy.spatial import cKDTree
 
 from problems import load
 from problems.catalogue import CASES, STANDARD
-from runs.data.page_header import PageHeader, print_standing, standing
+from runs.data.page_header import PageHeader, digest, print_standing, standing
 
 HERE = Path(__file__).parent
 COMMAND = "python docs/gallery/make.py"
@@ -41,8 +40,6 @@ RESULT, LESSONS = "## Result\n\n", "## What was learned\n\n"
 """Headings of a page."""
 DPI, SHADES, LARGEST, ACROSS = 100, (256, 64, 32, 24), 80_000, 3
 """Of pictures; how many colours they may have; their largest size, bytes; pictures in a row of the index."""
-ALONE = ("problems.cases", "problems.cases.standard")
-"""Packages whose modules are problems of their own; a case in another folder is made of all its modules."""
 
 
 @dataclass(frozen=True)
@@ -81,17 +78,17 @@ class Script:
     def page(self) -> Path:
         return self.path.with_suffix(".md")
 
-    def files(self) -> list[Path]:
-        """The files that state its problems."""
-        return [file for case in self.cases for file in stated_in(case)]
+    def digest(self) -> str:
+        """The digest of its problems, of their fingerprints."""
+        return digest(text=" ".join(map(fingerprint, self.cases)))
 
     def header(self) -> PageHeader:
         """That of a page which is made now."""
-        return PageHeader.now(f"{COMMAND} {self.name}", self.files())
+        return PageHeader.now(f"{COMMAND} {self.name}", self.digest())
 
     def result(self) -> tuple[PageHeader, str] | None:
         """Header and result of its page, unless that is of other code or of another problem."""
-        if not self.page.is_file() or not standing(self.page, files_of)[1]:
+        if not self.page.is_file() or not standing(self.page, digest_of)[1]:
             return None
         text = self.page.read_text(encoding="utf-8")
         before, _, after = text.partition(RESULT)
@@ -120,29 +117,19 @@ def scripts() -> list[Script]:
     return sorted(found, key=lambda script: min(order.index(case) for case in script.cases))
 
 
-def stated_in(case: str) -> list[Path]:
-    """The files that state a case: its module, or all of its folder if that is of one case and its variants."""
-    module: ModuleType | None = sys.modules[inspect.unwrap(_function(case)).__module__]
-    assert module is not None and module.__file__ is not None
-    own = Path(module.__file__)
-    if any(module.__name__.rpartition(".")[0] == alone for alone in ALONE) or case.startswith(STANDARD):
-        return [own]
-    return sorted(path for path in own.parent.rglob("*") if path.suffix in (".py", ".csv"))
+@cache
+def fingerprint(case: str) -> str:
+    """That of a problem of the catalogue."""
+    return load(case).compile().fingerprint
 
 
-def _function(case: str) -> Any:
-    load(case)
-    place, _, name = CASES[case][0].rpartition(":")
-    return getattr(sys.modules[place], name)
-
-
-def files_of(command: str) -> list[Path]:
-    """The files that state the problem of a page, from the command that makes it. Raises ValueError if there is no such command."""
+def digest_of(command: str) -> str:
+    """The digest of the problems of a page, from the command that makes it. Raises ValueError if there is no such command."""
     program, _, name = command.rpartition(" ")
     path = HERE / f"{name}.py"
     if program != COMMAND or not re.fullmatch(r"\w+", name) or not path.is_file():
         raise ValueError(f"there is no command '{command}'")
-    return Script.read(path).files()
+    return Script.read(path).digest()
 
 
 def show(path: Path) -> Shown:
@@ -281,7 +268,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if unknown:
         parser.error(f"there is no script {', '.join(sorted(unknown))}; there are {', '.join(script.name for script in found)}")
     if given.check:
-        current = print_standing((script.page for script in found), files_of)
+        current = print_standing((script.page for script in found), digest_of)
         differ = [script.name for script in found if not script.is_current()]
         print(f"other than their scripts say: {', '.join(differ)}" if differ else "all are as their scripts say")
         return int(not current or bool(differ))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from runs.bench import sources
 from runs.cli.parser import build_parser
-from runs.data.page_header import print_standing
+from runs.data.page_header import digest, print_standing
 
 HERE = Path(__file__).parent
 STUDIES = HERE.parents[1] / "runs" / "studies"
@@ -35,7 +35,7 @@ def files_of(command: str) -> list[Path]:
 def main(folder: Path = HERE) -> int:
     """Print a line for each page; returns the exit code."""
     pages = (page for page in folder.glob("*.md") if page.name not in ("index.md", "README.md"))
-    return int(not print_standing(pages, files_of))
+    return int(not print_standing(pages, lambda command: digest(*files_of(command))))
 
 
 if __name__ == "__main__":

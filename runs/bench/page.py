@@ -10,7 +10,7 @@ from pathlib import Path
 
 from macs.io.atomic import write_whole
 
-from ..data.page_header import PageHeader
+from ..data.page_header import PageHeader, digest
 
 PLACES = {"front": "fronts", "generation": "scale.generation"} | dict.fromkeys(("many", "uf", "zdt", "constrained"), "functions")
 """Modules that are not called as the benchmark."""
@@ -57,7 +57,7 @@ class Effort:
 
 def header_of(kind: str, effort: Effort, path: str | PathLike[str]) -> PageHeader:
     """The header of the page of a benchmark at a path. Raises ValueError if it cannot be written into a comment."""
-    return PageHeader.now(shlex.join(["macs", "bench", kind, *effort.words, "--page", str(path)]), sources(kind))
+    return PageHeader.now(shlex.join(["macs", "bench", kind, *effort.words, "--page", str(path)]), digest(*sources(kind)))
 
 
 def write_page(path: str | PathLike[str], kind: str, header: PageHeader, report: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from datetime import date
 from os import PathLike
@@ -34,7 +34,7 @@ class PageHeader:
     """
 
     command: str  # that makes the page
-    digest: str  # of the study file, or of the files of a bench. The page is out of date once theirs is another.
+    digest: str  # of the study file, of the files of a bench, or of problems. The page is out of date once theirs is another.
     version: str  # of this package when the page was written, and the digest of its code, see `code`. Runs of a study may be of older code.
     date: str  # year-month-day
 
@@ -45,9 +45,9 @@ class PageHeader:
                 raise ValueError(f"header of a page: '{word}' must be one line without '>', not {value!r}")
 
     @classmethod
-    def now(cls, command: str, files: Sequence[str | PathLike[str]]) -> PageHeader:
-        """The header of a page that this command makes today, of what these files state."""
-        return cls(command, digest(*files), version(), date.today().isoformat())
+    def now(cls, command: str, digest: str) -> PageHeader:
+        """The header of a page that this command makes today, with the digest of what states it."""
+        return cls(command, digest, version(), date.today().isoformat())
 
     @classmethod
     def read(cls, text: str) -> PageHeader:
@@ -81,23 +81,23 @@ def version() -> str:
     return f"{versions()['macs-trajectories']}+{code()}"
 
 
-def standing(page: Path, files_of: Callable[[str], Sequence[Path]]) -> tuple[str, bool]:
-    """The command of a page or what is wrong with it, and whether the page is as its command would make it now.
+def standing(page: Path, digest_of: Callable[[str], str]) -> tuple[str, bool]:
+    """The command of a page or what is wrong with it, and whether the page is as its command would make it now, by the digest.
 
     Results of other code than there is now are no fault, and are marked as such.
     """
     try:
         header = PageHeader.read(page.read_text(encoding="utf-8"))
-        current = digest(*files_of(header.command)) == header.digest
+        current = digest_of(header.command) == header.digest
     except (ValueError, OSError) as error:
         return str(error), False
     other = "" if header.version == version() else ", by other code"
     return f"{header.command}  ({header.date}{other}{'' if current else ', OUT OF DATE'})", current
 
 
-def print_standing(pages: Iterable[Path], files_of: Callable[[str], Sequence[Path]]) -> bool:
+def print_standing(pages: Iterable[Path], digest_of: Callable[[str], str]) -> bool:
     """Print a line for each page, see `standing`; returns whether all are as their commands would make them now."""
-    found = {page.name: standing(page, files_of) for page in sorted(pages)}
+    found = {page.name: standing(page, digest_of) for page in sorted(pages)}
     for name, (words, _) in found.items():
         print(f"{name}: {words}")
     return all(good for _, good in found.values())

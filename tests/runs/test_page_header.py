@@ -15,7 +15,7 @@ from runs.data.page_header import PageHeader, digest
 def test_header_as_written_is_read_again(tmp_path):
     file = tmp_path / "study.toml"
     file.write_bytes(b'name = "one"\n')
-    header = PageHeader.now("macs study report out/one --page one.md", [file])
+    header = PageHeader.now("macs study report out/one --page one.md", digest(file))
     assert header.date == date.today().isoformat()
     assert header.digest == hashlib.sha256(b'name = "one"\n').hexdigest() == digest(file)
     text = str(header)

@@ -18,7 +18,7 @@ from macs.io.atomic import check_target, write_whole
 from macs.io.text import counted, duration
 
 from ...batch.store import Store, Summary
-from ...data.page_header import PageHeader
+from ...data.page_header import PageHeader, digest
 from ..tables import Table
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Page:
         if self.path.suffix != ".md":
             raise ValueError(f"a page is a file .md, not '{path}'")
         check_target(self.path)
-        self._header, self._definition = PageHeader.now(command, [file]), dict(definition)
+        self._header, self._definition = PageHeader.now(command, digest(file)), dict(definition)
         self._parts: list[str] = []
         self._pictures: dict[str, bytes] = {}
 
