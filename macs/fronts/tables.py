@@ -191,10 +191,7 @@ def footer(front: Points) -> list[str]:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
     if front.stats["fallbacks"]:
         lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went to IPOPT, because the fast inner level failed.")
-    tried = {name: one["evaluations"] for name, one in front.stats.get("ways", {}).items() if one["evaluations"]}
-    if tried:
-        shown = ", ".join(f"{counted(evaluations, 'candidate')} by {name}" for name, evaluations in tried.items())
-        lines.append(f"Made feasible: {shown}.")
+    lines += [_by_inner_solver(name, **one) for name, one in front.stats.get("ways", {}).items() if one["evaluations"]]
     if not front.stats["reproducible"]:
         why = front.stats.get("stopped", "budget")
         ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve reached its time limit"
@@ -207,6 +204,14 @@ def footer(front: Points) -> list[str]:
     if front.message:
         lines.append(front.message)
     return lines
+
+
+def _by_inner_solver(name: str, evaluations: int, feasible: int | None = None, work: int = 0) -> str:
+    """How many candidates an inner solver was given, and how many of them were feasible; older files do not say the latter."""
+    was = "was" if evaluations == 1 else "were"
+    how = "propagated (integrated forward from their controls)" if name == "propagate" else f"solved by {name}"
+    known = "" if feasible is None else f"; {feasible:,} {'was' if feasible == 1 else 'were'} feasible".replace(",", " ")
+    return f"{counted(evaluations, 'candidate')} {was} {how}{known}."
 
 
 def _unresolved(front: Points) -> list[str]:

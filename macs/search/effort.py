@@ -23,15 +23,15 @@ DEAR, LEAST = 0.15, 0.03
 """Share of all work, with the gradient solves to come, of the ways that take more; least share of each."""
 MAKING = 300
 """Iterations of IPOPT that take about as long as to build the functions of a way: it is first tried when its share is worth as much."""
-BROUGHT, FOR, WORK, EVALUATIONS = range(4)
+BROUGHT, FOR, WORK, EVALUATIONS, FEASIBLE = range(5)
 """Columns of the effort of each way, the last of which are the gradient solves: what it brought, for which work, older ones count less;
-all work; all evaluations, or solves."""
+all work; all evaluations, or solves; those of the evaluations that were feasible."""
 
 
 def no_effort(ways: int, gradients: int) -> np.ndarray:
-    """Initial effort (ways + 1, 4). Gradient solves, one of which takes the work `gradients` or so, are believed to bring a whole front
+    """Initial effort (ways + 1, 5). Gradient solves, one of which takes the work `gradients` or so, are believed to bring a whole front
     each, until they were tried. Without gradients there is nothing to choose: what is only propagated is never made feasible."""
-    effort = np.zeros((ways + 1, 4))
+    effort = np.zeros((ways + 1, 5))
     effort[ways, [BROUGHT, FOR]] = 1.0, gradients
     return effort
 
@@ -45,7 +45,7 @@ def ways_of(effort: np.ndarray, count: int, every: int | None, making: float = 0
     for way in range(main):
         if ways[way, EVALUATIONS] <= CHEAP * evaluations:
             return np.full(count, way)
-    _, _, solving, solves = effort[-1]
+    solving, solves = effort[-1, [WORK, EVALUATIONS]]
     ahead = 0.0 if every is None else max(0.0, evaluations / every - solves) * (solving / solves if solves else effort[-1, FOR])
     chosen, free = np.full(count, main), count
     dear = np.arange(main + 1, len(ways))
@@ -61,12 +61,12 @@ def ways_of(effort: np.ndarray, count: int, every: int | None, making: float = 0
     return chosen
 
 
-def credited(effort: np.ndarray, way: int, brought: float, work: int, count: int) -> np.ndarray:
+def credited(effort: np.ndarray, way: int, brought: float, work: int, count: int, feasible: int = 0) -> np.ndarray:
     """The effort after `count` evaluations, or solves, by one way. What gradient solves brought is not forgotten: when proposals improve a
     front by little any more, it is still to be polished by these."""
     effort = effort.copy()
     effort[:-1, [BROUGHT, FOR]] *= 1.0 - FORGET
-    effort[way] += brought, work, work, count
+    effort[way] += brought, work, work, count, feasible
     return effort
 
 
@@ -106,7 +106,8 @@ def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Ga
         before = evaluator.counts.work
         parts.append(evaluator.evaluate(Z[chosen == way], way))
         done = evaluator.counts.work - before
-        state.effort = credited(state.effort, way, gains.of(parts[-1]), done, len(parts[-1].F))
+        feasible = int(np.count_nonzero(parts[-1].violation <= evaluator.tolerance))
+        state.effort = credited(state.effort, way, gains.of(parts[-1]), done, len(parts[-1].F), feasible)
     order = np.argsort(np.argsort(chosen, kind="stable"), kind="stable")
     whole = parts[0]
     for part in parts[1:]:
@@ -115,5 +116,6 @@ def evaluated(state: SearchState, evaluator: Evaluator, Z: np.ndarray, gains: Ga
 
 
 def spent(effort: np.ndarray, ways: Sequence[str]) -> dict[str, dict[str, int]]:
-    """Evaluations, and work, by the name of their way; those of the first population are not among them."""
-    return {name: {"evaluations": int(row[EVALUATIONS]), "work": int(row[WORK])} for name, row in zip(ways, effort, strict=False)}
+    """Evaluations, those of them that were feasible, and work, by the name of their way; the first population is not among them."""
+    columns = {"evaluations": EVALUATIONS, "feasible": FEASIBLE, "work": WORK}
+    return {name: {what: int(row[k]) for what, k in columns.items()} for name, row in zip(ways, effort, strict=False)}

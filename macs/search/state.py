@@ -89,7 +89,7 @@ class SearchState:
         Displacements of the last improvements of all agents, in units of span, oldest first.
     credit : array (o, 2)
         For each breeding operator, the number of offspring that stayed in the archive and of all offspring; see `breeding.updated_credit`.
-    effort : array (w + 1, 4)
+    effort : array (w + 1, 5)
         What the inner solvers, and the gradient solves, have brought for how much work; see `effort`.
     iteration, evaluations, refinements : int
         Iterations done; evaluations counted by the evaluator; gradient solves of agents.
@@ -115,7 +115,7 @@ class SearchState:
 
     SHAPES: ClassVar[dict[str, str]] = {
         "ideal": "m", "nadir": "m", "directions": "k m", "experience": "e d", "credit": "o 2", "restored": "2 2",
-        "progress": "2 2", "effort": "w 4", "alike": "m bool", "in_vain": "v 2m",
+        "progress": "2 2", "effort": "w 5", "alike": "m bool", "in_vain": "v 2m",
     }  # fmt: skip
     INDICES: ClassVar[dict[str, str]] = {"agents.direction": "directions"}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import casadi as ca
@@ -19,8 +20,8 @@ from transcription.inner import Auto, inner_solver
 
 
 def effort(*rows) -> np.ndarray:
-    """Of each way, and of gradient solves: what it brought, for which work, all work, evaluations."""
-    return np.array(rows, dtype=float)
+    """Of each way, and of gradient solves: what it brought, for which work, all work, evaluations, of which none was feasible."""
+    return np.array([(*row, 0) for row in rows], dtype=float)
 
 
 def test_proposals_go_to_the_way_that_brings_most_for_its_work():
@@ -49,7 +50,7 @@ def test_ways_that_take_more_have_their_share_of_work_and_of_solves_to_come():
     making = LEAST * 900
     assert ways_of(known, 10, None, making).tolist() == [0] * 8 + [2, 1], "their shares are worth as much as their functions"
     assert (ways_of(known, 10, None, 1.01 * making)[:9] == 0).all() and (ways_of(known, 10, None, 9 * making) == 0).all()
-    known[1], known[2] = (0.01, 1, 10, 1), (0.0, 1, 100, 1)
+    known[1, :4], known[2, :4] = (0.01, 1, 10, 1), (0.0, 1, 100, 1)
     share = DEAR - LEAST
     left = share * (900 + 110) - 10, share * (900 + 110 + 902 / 20 * 10) - 10
     assert [(ways_of(known, 40, every) == 1).sum() for every in (None, 20)] == [int(one / 10) for one in left]
@@ -57,11 +58,12 @@ def test_ways_that_take_more_have_their_share_of_work_and_of_solves_to_come():
 
 
 def test_what_was_brought_is_forgotten_but_not_what_gradient_solves_brought():
-    after = credited(no_effort(2, 1000), 0, 0.5, 30, 10)
-    assert after.tolist() == [[0.5, 30, 30, 10], [0, 0, 0, 0], [1.0, 1000, 0, 0]]
+    after = credited(no_effort(2, 1000), 0, 0.5, 30, 10, 7)
+    assert after.tolist() == [[0.5, 30, 30, 10, 7], [0, 0, 0, 0, 0], [1.0, 1000, 0, 0, 0]]
     again = credited(after, 1, 0.0, 70, 5)
-    assert again[:2].tolist() == [[0.45, 27, 30, 10], [0, 70, 70, 5]] and (again[2] == after[2]).all()
-    assert spent(again, ("one", "two")) == {"one": {"evaluations": 10, "work": 30}, "two": {"evaluations": 5, "work": 70}}
+    assert again[:2].tolist() == [[0.45, 27, 30, 10, 7], [0, 70, 70, 5, 0]] and (again[2] == after[2]).all()
+    one, two = {"evaluations": 10, "feasible": 7, "work": 30}, {"evaluations": 5, "feasible": 0, "work": 70}
+    assert spent(again, ("one", "two")) == {"one": one, "two": two}
 
 
 def found(F, violation) -> Evaluation:
@@ -141,7 +143,14 @@ def test_a_divided_search_takes_a_part_of_the_work_and_finds_as_good_a_front():
     ways = auto.stats["ways"]
     assert set(ways) == {"propagate", "newton", "ipopt"} and "ways" not in projected.stats
     assert sum(one["evaluations"] for one in ways.values()) <= 240 == auto.stats["evaluations"]
-    assert "Made feasible: " in auto.table()
+    assert all(0 <= one["feasible"] <= one["evaluations"] for one in ways.values())
+    # The first population, and gradient solves, fail too, but are not among the candidates of `ways`.
+    assert sum(one["evaluations"] - one["feasible"] for one in ways.values()) <= sum(auto.stats["failures"].values())
+    told = {name: one for name, one in ways.items() if one["evaluations"]}
+    lines = [line for line in auto.table().split("\n") if "candidate" in line]
+    assert [[int(one) for one in re.findall(r"\d+", line)] for line in lines] == [
+        [one["evaluations"], one["feasible"]] for one in told.values()
+    ]
 
 
 @pytest.mark.slow
