@@ -29,9 +29,9 @@ from ..gradients.front_polish import KEPT_INSIDE
 from ..gradients.multistart import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
-from ..preferences.checks import shown
-from ..preferences.ranking import BEYOND, CONFIRMED, standing
-from ..preferences.stage import SLACK, exceeded, ordering
+from ..preferences.preference import BEYOND, CONFIRMED, standing
+from ..preferences.ranges import shown
+from ..preferences.stage import LIMIT_TOL, exceeded, ordering
 from ..solvers.start import beginning
 from .choice import Choice, Step
 from .judging import excess_stage, keeps, meets, unmet, with_all_limits
@@ -205,7 +205,7 @@ class Desk:
         nearest: Point | None = None
         if limits.limit_names and not any(meets(limits, point) for point in candidates):
             begun = self._within_limits(preference, limits, candidates, about)
-            if begun.status == CONVERGED and limits.excess((begun.F * self.problem.signs)[None])[0] > SLACK:
+            if begun.status == CONVERGED and limits.excess((begun.F * self.problem.signs)[None])[0] > LIMIT_TOL:
                 nearest = self._mended(preference, [excess_stage(limits)], begun, about)
                 if not meets(limits, nearest):
                     return nearest, unmet(limits, self.problem.goals, np.array([*nearest.objectives.values()]))

@@ -26,8 +26,7 @@ from ..io.atomic import check_target
 from ..io.text import counted, text_table
 from ..preferences import Preference, Ranges, to_dict
 from ..preferences import from_dict as preference_from_dict
-from ..preferences.checks import shown
-from ..preferences.ranges import confidence
+from ..preferences.ranges import confidence, shown
 from .choice import Choice, degree_text
 from .decide import decide
 from .dialogue_file import FORMAT, VERSION, ChoiceRecord, DialogueRecord, TurnRecord, finite, packed, read, readable, write

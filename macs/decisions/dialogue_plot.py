@@ -12,7 +12,7 @@ from problems.compiled import Objective
 
 from ..fronts.pictures.style import COLORS, GREY, STYLE, axis_label, new_figure
 from ..preferences import Preference, Ranges
-from ..preferences.pictures.degree_plot import draw_degrees
+from ..preferences.pictures import draw_degrees
 from .choice import Choice
 
 if TYPE_CHECKING:

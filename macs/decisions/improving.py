@@ -12,8 +12,8 @@ from problems.compiled import Objective
 
 from ..fronts.point import Point
 from ..preferences import Larger, Nimbus, PhysicalProgramming, Preference, Ranges, ReferencePoint, Smaller
-from ..preferences.checks import named_numbers, places, shown
-from ..preferences.physical.classes import COUNT, ObjectiveClass
+from ..preferences.preference_functions import BOUNDARIES, ObjectiveClass
+from ..preferences.ranges import named_numbers, places, shown
 
 NOTHING = 1e-9
 """Part of a range by which a value must be better than another."""
@@ -92,7 +92,7 @@ def _better(old: ObjectiveClass | None, goal: Objective, asked: float, now: floa
     if side is None:
         raise ValueError(f"'{goal.name}' is ideal as it is: {shown(now, goal)}")
     part = abs(now - side.boundaries[0]) / float(side.lengths.sum())
-    lower, upper = old.boundaries[:COUNT], old.boundaries[-COUNT:]
+    lower, upper = old.boundaries[:BOUNDARIES], old.boundaries[-BOUNDARIES:]
     boundaries = [*(lower[-1] + part * (b - lower[-1]) for b in lower), *(upper[0] + part * (b - upper[0]) for b in upper)]
     return type(old)(*dict.fromkeys(boundaries))
 

@@ -12,9 +12,9 @@ from problems.compiled import Objective
 
 from ..fronts.point import Point
 from ..preferences import Stage
-from ..preferences.checks import shown
-from ..preferences.ranking import BEYOND, standing
-from ..preferences.stage import SLACK, exceeded
+from ..preferences.preference import BEYOND, standing
+from ..preferences.ranges import shown
+from ..preferences.stage import LIMIT_TOL, exceeded
 
 ALIKE = 0.5
 """Part of the largest excess from which on a limit is in conflict with others."""
@@ -43,7 +43,7 @@ def excess_stage(limits: Stage) -> Stage:
 
 def meets(limits: Stage, point: Point) -> bool:
     """Whether a point is within the limits of a stage."""
-    return bool(limits.excess(np.array([list(point.objectives.values())]))[0] <= SLACK)
+    return bool(limits.excess(np.array([list(point.objectives.values())]))[0] <= LIMIT_TOL)
 
 
 def keeps(limits: Stage, point: Point, verify: float) -> bool:

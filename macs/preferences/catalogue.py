@@ -10,16 +10,11 @@ import numpy as np
 
 from problems.checks import settings_of, unknown
 
-from .fuzzy_goal import FuzzyGoal
-from .fuzzy_satisfactory import FuzzySatisfactory
-from .goal_programming import GoalProgramming
-from .nimbus import Nimbus
-from .physical import FuzzyPhysicalProgramming, Larger, PhysicalProgramming, Range, Smaller, Value
-from .physical.classes import ObjectiveClass
+from .achievement import Nimbus, ReferencePoint, WeightedSum
+from .goals import Around, FuzzyGoal, FuzzySatisfactory, GoalProgramming
+from .physical import FuzzyPhysicalProgramming, PhysicalProgramming
 from .preference import Preference
-from .reference_point import ReferencePoint
-from .targets import Around
-from .weighted_sum import WeightedSum
+from .preference_functions import Larger, ObjectiveClass, Range, Smaller, Value
 
 METHODS: dict[str, type[Preference]] = {
     one.__name__: one

@@ -11,17 +11,42 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from .checks import shown
+from .ranges import shown
 
 Operand = Any
-"""A number, an array (n,), or a symbol of CasADi: only operators and the functions of `operands` are applied to it."""
+"""A number, an array (n,), or a symbol of CasADi: only operators and the functions below are applied to it."""
+NUMERIC = (int, float, np.number, np.ndarray)
 
-SLACK = 1e-6
+
+def exp(x: Any) -> Any:
+    """e to the power x."""
+    return np.exp(x) if isinstance(x, NUMERIC) else x.exp()
+
+
+def log10(x: Any) -> Any:
+    """Logarithm of x to base 10."""
+    return np.log10(x) if isinstance(x, NUMERIC) else x.log10()
+
+
+def greatest(x: Any, bound: float) -> Any:
+    """The larger of x and a number."""
+    return np.fmax(x, bound) if isinstance(x, NUMERIC) else x.fmax(bound)
+
+
+def least(x: Any, bound: float) -> Any:
+    """The smaller of x and a number."""
+    return np.fmin(x, bound) if isinstance(x, NUMERIC) else x.fmin(bound)
+
+
+def clipped(x: Any, lower: float, upper: float) -> Any:
+    """x, but at least `lower` and at most `upper`."""
+    return least(greatest(x, lower), upper)
+
+
+LIMIT_TOL = 1e-6
 """A hard limit counts as met by points that exceed it by less than this, in its own scale: optima lie on limits up to rounding."""
 ATTAINED = 1e-9
 """A value that is not larger counts as zero."""
-STEP = 1e-4
-"""Part of an objective, or of 1, by which it is moved to see in which unit a limit is."""
 
 
 def _nothing(J: Sequence[Operand]) -> list[Any]:
@@ -76,7 +101,7 @@ class Stage:
         with np.errstate(all="ignore"):
             peaks = [reduce(np.maximum, [np.asarray(operand, dtype=float) for operand in group]) for group in self.groups(J)]
             values = np.asarray(self.value(J, peaks), dtype=float) + np.zeros(len(objectives))
-        return np.where(good & (self.excess(objectives) <= SLACK), values, np.inf)
+        return np.where(good & (self.excess(objectives) <= LIMIT_TOL), values, np.inf)
 
     def excess(self, objectives: np.ndarray) -> np.ndarray:
         """Largest amount (n,) by which a limit is exceeded at objectives (n, m), at least 0; infinite where an objective is not finite."""
@@ -104,14 +129,15 @@ def exceeded(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
     return ", ".join(
         f"'{name}' is missed by {_amount(limits, k, goals, J)}"
         for k, (name, one) in enumerate(zip(limits.titles(len(excess)), excess, strict=True))
-        if one > SLACK
+        if one > LIMIT_TOL
     )
 
 
 def _amount(limits: Stage, k: int, goals: Sequence[Objective], J: np.ndarray) -> str:
     """By how much objectives (m,) exceed a limit: in the unit of its objective, where it is a limit of one."""
     here = float(limits.excesses(J[None])[0, k])
-    steps = STEP * np.maximum(np.abs(J), 1.0)
+    # Moving one objective at a time shows which the limit is of, and in which unit.
+    steps = 1e-4 * np.maximum(np.abs(J), 1.0)
     slopes = (limits.excesses(J + np.diag(steps))[:, k] - here) / steps
     (own,) = np.nonzero(slopes)
     return f"{here:.3g}" if len(own) != 1 else shown(here / abs(float(slopes[own[0]])), goals[own[0]])
@@ -145,7 +171,7 @@ def ordering(
         follows = columns[-1] <= same if columns and stage.after_zero else np.ones(len(found), dtype=bool)
         columns.append(np.where(follows, found, np.nan))
     excess = np.max([stage.excess(objectives) for stage in stages], axis=0)
-    excess = np.where(excess > SLACK, excess, 0.0)
+    excess = np.where(excess > LIMIT_TOL, excess, 0.0)
     keys = [*((kind, 0.0), (excess, 0.0)), *((one, same) for one in columns[:-1]), (columns[-1], 0.0)]
     if tie is not None:
         keys.append((tie, 0.0))

@@ -11,7 +11,7 @@ import numpy as np
 from macs.fronts.pictures.style import COLORS, label
 from macs.fronts.point import Point
 from macs.preferences import FuzzySatisfactory, Preference, Ranges, from_dict
-from macs.preferences.pictures.degree_plot import draw_degrees
+from macs.preferences.pictures import draw_degrees
 
 from .comparison import Comparison
 from .flight_plots import flights_figure

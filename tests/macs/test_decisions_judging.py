@@ -10,7 +10,7 @@ from choices import plain_front
 
 from macs.decisions import Stage
 from macs.decisions.judging import excess_stage, keeps, meets, unmet, with_all_limits
-from macs.preferences.stage import SLACK
+from macs.preferences.stage import LIMIT_TOL
 from problems.compiled import Objective
 
 TIME, MASS = Objective("time", "s"), Objective("mass")
@@ -71,7 +71,7 @@ def test_the_stage_of_the_excess_is_the_largest_and_is_called_so_in_a_history() 
 @pytest.mark.parametrize(("share", "within"), [(-1.0, True), (0.0, True), (1.0, True), (1.1, False), (1e6, False)])
 def test_rounding_does_not_count_as_beyond_a_limit(share: float, within: bool) -> None:
     """What is met has a value, what is not has none: both are told by the same slack, exactly."""
-    stage, point = limited("cheap", (0, 0.0, "time at most 0")), at(share * SLACK, 1.0)
+    stage, point = limited("cheap", (0, 0.0, "time at most 0")), at(share * LIMIT_TOL, 1.0)
     assert meets(stage, point) is within
     assert keeps(stage, point, 1e-3) is within
     assert np.isfinite(stage.numbers(np.array([[*point.objectives.values()]]))[0]) == within

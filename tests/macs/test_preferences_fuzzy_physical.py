@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from macs.decisions import FuzzyPhysicalProgramming, Larger, PhysicalProgramming, Range, Smaller, Value
-from macs.preferences.physical.smoothing import FuzzyFunction
+from macs.preferences.preference_functions import FuzzyFunction
 
 CLASSES = [
     Smaller(1, 2, 3, 4, 5),

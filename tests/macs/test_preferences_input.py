@@ -24,7 +24,7 @@ from macs.decisions import (
     Value,
     WeightedSum,
 )
-from macs.preferences.checks import levels, shown
+from macs.preferences.ranges import levels, shown
 from problems.compiled import Objective
 
 BOTH = {"time": 2.0, "effort": 1.0}

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from macs.preferences.operands import clipped, exp, greatest, least, log10
+from macs.preferences.stage import clipped, exp, greatest, least, log10
 
 ALL: dict[str, tuple[Callable[[Any], Any], Callable[[float], float]]] = {
     "exp": (exp, math.exp),

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
 from macs.decisions import Larger, PhysicalProgramming, Range, Ranges, Smaller, Value
-from macs.preferences.physical.spline import PreferenceFunction
+from macs.preferences.preference_functions import PreferenceFunction
 from problems.compiled import Objective
 
 CLASSES = {Smaller: 5, Larger: 5, Value: 9, Range: 10}

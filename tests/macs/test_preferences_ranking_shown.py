@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from synthetic_fronts import marked
 
 from macs.decisions import FuzzyGoal, Nimbus, PhysicalProgramming, Ranges, Smaller, WeightedSum
-from macs.preferences.ranking import SHOWN, standing
+from macs.preferences.preference import standing
 from problems.compiled import Objective
 
 A, B = Objective("a", "kg"), Objective("b", "", "maximize")
@@ -56,8 +56,8 @@ def test_what_does_not_enter_has_no_column_and_what_is_not_shown_is_counted() ->
     assert lines[-1] == "... 2 more points" and len(lines) == 8
     assert ranking.table(3).splitlines()[-1] == "... 1 more point"
     assert "more" not in ranking.table(4) and "more" not in ranking.table(None)
-    many = WeightedSum({"a": 1.0}).rank(front(*((float(k), 0.0) for k in range(SHOWN + 3))))
-    assert many.table().splitlines()[-1] == "... 3 more points" and len(many.table(None).splitlines()) == 5 + SHOWN + 3
+    many = WeightedSum({"a": 1.0}).rank(front(*((float(k), 0.0) for k in range(23))))
+    assert many.table().splitlines()[-1] == "... 3 more points" and len(many.table(None).splitlines()) == 28
 
 
 def test_what_is_no_number_is_a_dash_and_what_is_to_be_known_is_below() -> None:

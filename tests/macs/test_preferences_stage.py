@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from macs.decisions import Stage
-from macs.preferences.stage import SLACK, exceeded, ordering
+from macs.preferences.stage import LIMIT_TOL, exceeded, ordering
 from problems.compiled import Objective
 
 GOALS = (Objective("time", "s"), Objective("mass", "kg", "maximize"), Objective("risk"))
@@ -40,9 +40,9 @@ def test_peaks_are_the_largest_of_their_groups() -> None:
 
 
 def test_what_exceeds_a_limit_has_no_value() -> None:
-    J = rows((2.0, 5.0, 2.0), (2.0 + 1.9 * SLACK, 5.0, 3.0), (2.0 + 2.1 * SLACK, 5.0, 3.0), (2.0, 4.0, 2.0), (2.0, 5.0, 1.5))
+    J = rows((2.0, 5.0, 2.0), (2.0 + 1.9 * LIMIT_TOL, 5.0, 3.0), (2.0 + 2.1 * LIMIT_TOL, 5.0, 3.0), (2.0, 4.0, 2.0), (2.0, 5.0, 1.5))
     assert np.isfinite(LIMITED.numbers(J)).tolist() == [True, True, False, False, False]
-    assert LIMITED.excess(J) == pytest.approx([0.0, 0.95 * SLACK, 1.05 * SLACK, 0.1, 0.5])
+    assert LIMITED.excess(J) == pytest.approx([0.0, 0.95 * LIMIT_TOL, 1.05 * LIMIT_TOL, 0.1, 0.5])
     assert LIMITED.excesses(rows((1.0, 7.0, 3.0))) == pytest.approx(rows((-0.5, -0.2, -2.0)))
     assert LIMITED.excess(rows((1.0, 7.0, 3.0))).tolist() == [0.0], "met by more is met"
     assert Stage("one", lambda J, peaks: J[0], limits=lambda J: [0.5]).excess(rows((1.0,), (2.0,))).tolist() == [0.5, 0.5]
@@ -50,7 +50,7 @@ def test_what_exceeds_a_limit_has_no_value() -> None:
 
 def test_what_is_exactly_at_the_slack_is_met_for_all() -> None:
     stage = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[0]])
-    for amount, met in ((SLACK, True), (np.nextafter(SLACK, 1.0), False)):
+    for amount, met in ((LIMIT_TOL, True), (np.nextafter(LIMIT_TOL, 1.0), False)):
         J = rows((amount, 0.0, 0.0))
         assert bool(np.isfinite(stage.numbers(J)[0])) is met
         assert (exceeded(stage, GOALS, J[0]) == "") is met
@@ -88,7 +88,7 @@ def test_what_is_missed_is_said_in_the_unit_of_its_objective() -> None:
     unnamed = Stage("cheap", lambda J, peaks: J[0], limits=lambda J: [J[0] - 1.0, 3.0 * (2.0 - J[1])])
     assert exceeded(unnamed, GOALS, np.array([0.0, 1.0, 0.0])) == "'limit 2 of cheap' is missed by 1 kg"
     assert exceeded(LIMITED, GOALS, np.array([0.0, 5.0, 0.0])) == "", "what is met is not missed"
-    assert exceeded(LIMITED, GOALS, np.array([2.0 + SLACK, 5.0, 3.0])) == ""
+    assert exceeded(LIMITED, GOALS, np.array([2.0 + LIMIT_TOL, 5.0, 3.0])) == ""
     assert exceeded(LIMITED, GOALS, np.array([np.nan, 5.0, np.inf])) == "'time', 'risk' is no number"
     with pytest.raises(ValueError, match="zip"):
         exceeded(LIMITED, GOALS[:2], np.array([1.0, 5.0, 1.0]))
@@ -109,8 +109,8 @@ def test_the_kind_comes_first_then_the_limits_and_then_the_values() -> None:
     assert found.excess.tolist() == [0.0, 0.0, 1.0, 0.5, 0.0]
     assert found.values[:, 0].tolist() == [4.0, 3.0, np.inf, np.inf, 0.0]
     # Rounding is no excess, so that it does not order.
-    assert ordering([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * SLACK)), np.zeros(2)).excess.tolist() == [0.0, 0.0]
-    assert ordered([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * SLACK))) == [1, 0]
+    assert ordering([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * LIMIT_TOL)), np.zeros(2)).excess.tolist() == [0.0, 0.0]
+    assert ordered([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * LIMIT_TOL))) == [1, 0]
 
 
 def test_limits_of_all_stages_count() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from macs.decisions import Around, FuzzyGoal, FuzzySatisfactory, GoalProgramming, Nimbus, Ranges, ReferencePoint, WeightedSum
-from macs.preferences.targets import aims
+from macs.preferences.goals import aims
 from problems.compiled import Objective
 
 A, B, C = Objective("a", "kg"), Objective("b", "m", "maximize"), Objective("c")

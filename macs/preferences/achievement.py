@@ -1,4 +1,5 @@
-"""NIMBUS: which objectives may change, and how, from a current point (Miettinen and Mäkelä 2006)."""
+"""Preferences by normalised objectives: the weighted sum, the achievement scalarising function of reference points (Wierzbicki 1980, 1982),
+and NIMBUS, which says which objectives may change, and how, from a current point (Miettinen and Mäkelä 2006)."""
 
 from __future__ import annotations
 
@@ -8,15 +9,145 @@ from typing import ClassVar
 
 import numpy as np
 
-from problems.checks import check_interval, short_repr
+from problems.checks import check_interval
 from problems.compiled import Objective
 
 from ..fronts.point import Point
-from .checks import named_numbers, names_of, places, shown
 from .preference import Preference, needed
-from .ranges import Ranges
-from .reference_point import AUGMENTATION
-from .stage import SLACK, Operand, Stage
+from .ranges import Ranges, named_numbers, named_weights, names_of, places, shown
+from .stage import LIMIT_TOL, Operand, Stage
+
+AUGMENTATION = 1e-4
+"""Weight of the sum of all objectives beside the largest, so that the point is properly Pareto-optimal: of the size that the books use."""
+
+
+@dataclass(frozen=True, repr=False)
+class WeightedSum(Preference):
+    """Minimises the weighted sum of objectives that are 0 at the best and 1 at the worst value of their ranges.
+
+    It finds no point of a part of the front that bows inward.
+
+    Degrees: 1 at the best, 0 at the worst value of the range, linear between and beyond.
+
+    Parameters
+    ----------
+    weights : dict
+        By name of objectives, not negative. An objective that is not named has weight 0.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import WeightedSum
+    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 3})
+    >>> print(wish.rank(front).order)  # best first
+    [2 1 0]
+    """
+
+    weights: Mapping[str, float]
+
+    DEGREE: ClassVar[str] = "degree (1: best, 0: worst)"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", named_weights(self.weights))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.weights)
+
+    def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
+        found, spans = places(self.weights, goals), needed(ranges, self)
+
+        def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
+            normal = spans.normalised(goals, J)
+            return sum(weight * normal[found[name]] for name, weight in self.weights.items())
+
+        return (Stage("weighted sum", value),)
+
+    def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
+        return 1.0 - np.stack(needed(ranges, self).normalised(goals, list(np.asarray(objectives, dtype=float).T)), axis=1)
+
+
+@dataclass(frozen=True, repr=False)
+class ReferencePoint(Preference):
+    """Minimises the largest distance from an aspiration, and a little of the sum of all: max_i a_i + augmentation * sum_i a_i.
+
+    a_i is 0 at the aspiration and 1 at the reservation of objective i, linear between and beyond. It is negative where the objective is
+    better than its aspiration, so that the point is Pareto-optimal whether or not the aspirations can be met.
+
+    Degrees: 1 - a_i: 1 at the aspiration, 0 at the reservation, linear beyond.
+
+    Parameters
+    ----------
+    aspiration : dict
+        Values that are hoped for, by name. An objective that is not named has the best value of its range.
+    reservation : dict, optional
+        Values that are still acceptable, by name. An objective that is not named has the one that is a range's width worse than its
+        aspiration.
+    augmentation : float
+        Above 0, the point is properly Pareto-optimal: no trade-off is beyond 1 / augmentation, in units of a_i.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import ReferencePoint
+    >>> wish = ReferencePoint({"flight time": 150.0})
+    >>> print(wish.rank(front).order)  # best first
+    [1 2 0]
+    """
+
+    aspiration: Mapping[str, float]
+    reservation: Mapping[str, float] | None = None
+    augmentation: float = AUGMENTATION
+
+    DEGREE: ClassVar[str] = "degree (1: aspiration, 0: reservation)"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "aspiration", named_numbers(self.aspiration, "the aspiration"))
+        if self.reservation is not None:
+            object.__setattr__(self, "reservation", named_numbers(self.reservation, "the reservation"))
+        check_interval("augmentation", self.augmentation, "[0, 1]")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys([*self.aspiration, *(self.reservation or {})]))
+
+    def _lines(self, goals: Sequence[Objective], ranges: Ranges | None) -> list[tuple[float, float]]:
+        """The slope of a_i and its aspiration, for each goal."""
+        spans, lines = needed(ranges, self), []
+        reservation = self.reservation or {}
+        self.check(goals)
+        for goal, span in zip(goals, spans.spans(goals).tolist(), strict=True):
+            name, hoped = goal.name, self.aspiration.get(goal.name, spans.best[goal.name])
+            spans.check(hoped, goal, "the aspiration")
+            if name in reservation:
+                spans.check(reservation[name], goal, "the reservation")
+                span = goal.sign * (reservation[name] - hoped)
+                if span <= 0:
+                    least = f"the reservation of '{name}', {shown(reservation[name], goal)}"
+                    raise ValueError(f"{least}, must be worse than its aspiration, {shown(hoped, goal)}")
+            lines.append((goal.sign / span, hoped))
+        return lines
+
+    def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
+        lines = self._lines(goals, ranges)
+
+        def distances(J: Sequence[Operand]) -> list[Operand]:
+            return [slope * (value - hoped) for value, (slope, hoped) in zip(J, lines, strict=True)]
+
+        def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
+            return peaks[0] + self.augmentation * sum(distances(J))
+
+        return (Stage("achievement", value, lambda J: [distances(J)]),)
+
+    def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
+        slopes, hoped = np.array(self._lines(goals, ranges)).T
+        return 1.0 - slopes * (np.asarray(objectives, dtype=float) - hoped)
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,8 +226,6 @@ class Nimbus(Preference):
             raise ValueError("Nimbus needs an objective that is to become better, in `improve` or `to`")
         if not self._until and not self.free:
             raise ValueError("Nimbus needs an objective that may become worse, in `until` or `free`")
-
-    __repr__ = short_repr
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -178,5 +307,5 @@ class Nimbus(Preference):
                 done = goal.sign * (self.current[goal.name] - J[:, place])
                 result[:, place] = np.clip(done / way, 0.0, 1.0) if way > 0 else 1.0
             else:
-                result[:, place] = np.where(goal.sign * (J[:, place] - limit) <= SLACK * widths[place], 1.0, 0.0)
+                result[:, place] = np.where(goal.sign * (J[:, place] - limit) <= LIMIT_TOL * widths[place], 1.0, 0.0)
         return result

@@ -1,24 +1,21 @@
-"""Physical programming (Messac 1996): ranges of preference instead of weights."""
+"""Physical programming (Messac 1996): ranges of preference instead of weights; with fuzzy boundaries, Chai and others (2017)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
-from problems.checks import check_interval, short_repr
+from problems.checks import check_interval, positive
 from problems.compiled import Objective
 
-from ..checks import named, places
-from ..operands import log10
-from ..preference import Preference
-from ..ranges import Ranges
-from ..stage import Operand, Stage
-from .classes import NAMES, ObjectiveClass
-from .spline import PreferenceFunction, preference_functions
+from .preference import Preference
+from .preference_functions import RANGE_NAMES, FuzzyFunction, ObjectiveClass, PreferenceFunction, preference_functions
+from .ranges import Ranges, named, places
+from .stage import Operand, Stage, log10
 
 CRISP = "preference function"
 """Word of legends."""
@@ -60,7 +57,7 @@ class PhysicalProgramming(Preference):
     DEGREE: ClassVar[str] = "degree"
     SMALLER: ClassVar[bool] = True
     FUZZY: ClassVar[str] = "fuzzy preference function"
-    MARKS: ClassVar[tuple[tuple[float, str], ...]] = tuple((k + 0.5, name) for k, name in enumerate(NAMES))
+    MARKS: ClassVar[tuple[tuple[float, str], ...]] = tuple((k + 0.5, name) for k, name in enumerate(RANGE_NAMES))
 
     def __post_init__(self) -> None:
         classes = named(self.classes, "classes")
@@ -69,8 +66,6 @@ class PhysicalProgramming(Preference):
                 raise ValueError(f"the class of '{name}' must be Smaller, Larger, Value or Range, not {one!r}")
         object.__setattr__(self, "classes", classes)
         check_interval("beta", self.beta, "(1, inf)")
-
-    __repr__ = short_repr
 
     @cached_property
     def functions(self) -> dict[str, PreferenceFunction]:
@@ -124,7 +119,7 @@ class PhysicalProgramming(Preference):
         return "preference"
 
     def _curves(self, goals: Sequence[Objective], ranges: Ranges) -> list[Any]:
-        from ..pictures.function_plot import Curve
+        from .pictures import Curve
 
         found, minimised = self._places(goals), self.minimised()
         curves = []
@@ -137,3 +132,75 @@ class PhysicalProgramming(Preference):
             directed = one.SENSE is not None
             curves.append(Curve(goal, found[name], (*fuzzy, (CRISP, crisp)), low, high, tuple(marks), one.degree, directed))
         return curves
+
+
+SPREAD = 0.1
+
+
+@dataclass(frozen=True, repr=False)
+class FuzzyPhysicalProgramming(PhysicalProgramming):
+    """Physical programming with fuzzy boundaries: each preference function is smoothed by a Gaussian, cut off at three spreads.
+
+    A fuzzy preference is the mean of the crisp one around J, under exp(-((t - J) / spread)^2). It is once more continuously differentiable,
+    not below the crisp one, which is convex but for the ideal range of class 4S, and tends to it with the spread. The fifth boundaries are
+    hard limits as without fuzziness.
+
+    Degrees: those of `PhysicalProgramming`, at the boundaries as given.
+
+    Parameters
+    ----------
+    classes, beta
+        See `PhysicalProgramming`.
+    spread : float or dict
+        A number: in mean lengths of the objective's ranges between J_1 and J_5. A dict: by name, in the objective's unit, for each that has
+        a class.
+    printed : bool
+        Whether the Gaussian is centred at the nearest boundary, as eq. (35) is printed: that function jumps half-way between boundaries.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import FuzzyPhysicalProgramming, Smaller
+    >>> wish = FuzzyPhysicalProgramming({"flight time": Smaller(120, 140, 170, 210, 260)}, spread={"flight time": 5.0})
+    >>> print(wish.rank(front).order)  # best first
+    [0 1 2]
+    """
+
+    _: KW_ONLY
+    spread: float | Mapping[str, float] = SPREAD
+    printed: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.spread, Mapping):
+            given = {name: positive(value, f"the spread of '{name}'") for name, value in named(self.spread, "spread").items()}
+            for name in given:
+                if name not in self.classes:
+                    raise ValueError(f"'{name}' has a spread but no class; there are classes of {', '.join(self.classes)}")
+            for name in self.classes:
+                if name not in given:
+                    raise ValueError(f"'{name}' has a class but no spread")
+            object.__setattr__(self, "spread", given)
+        else:
+            object.__setattr__(self, "spread", positive(self.spread, "spread"))
+        if not isinstance(self.printed, bool):
+            raise ValueError(f"printed must be True or False, not {self.printed!r}")
+
+    @property
+    def spreads(self) -> dict[str, float]:
+        """The spread of each objective in its unit, by name."""
+        if isinstance(self.spread, Mapping):
+            return dict(self.spread)
+        lengths = {name: [float(side.lengths.mean()) for side in one.sides] for name, one in self.classes.items()}
+        return {name: self.spread * sum(both) / len(both) for name, both in lengths.items()}
+
+    @cached_property
+    def fuzzy_functions(self) -> dict[str, FuzzyFunction]:
+        """The fuzzy preference function of each objective, by name."""
+        return {name: FuzzyFunction(crisp, self.spreads[name], self.printed) for name, crisp in self.functions.items()}
+
+    def minimised(self) -> dict[str, Callable[[Operand], Operand]]:
+        return dict(self.fuzzy_functions)
