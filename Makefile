@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: run test test-slow lint docs gallery mutants fuzz kills package clean
+.PHONY: run test quick test-slow lint docs gallery mutants fuzz kills package clean
 
 run: $(READY)
 	mkdir -p out
@@ -11,6 +11,10 @@ run: $(READY)
 
 test: $(READY)
 	$(BIN)/python -m pytest -m "not slow" -n 2
+
+# The quick tests of what has changed since the last commit, in seconds.
+quick: $(READY)
+	$(BIN)/python -P tests/quick.py
 
 test-slow: $(READY)
 	$(BIN)/python -m pytest -m slow -n 2 --dist loadgroup --no-loadscope-reorder

@@ -14,6 +14,6 @@ def test_no_folder_has_more_than_14_modules():
     assert {str(folder): count for folder, count in counts.items() if count > 14} == {}
 
 
-def test_no_module_has_more_than_450_lines():
+def test_no_module_has_more_than_700_lines():
     lines = {str(path.relative_to(ROOT)): len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES}
-    assert {name: count for name, count in lines.items() if count > 450} == {}
+    assert {name: count for name, count in lines.items() if count > 700} == {}
