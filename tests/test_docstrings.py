@@ -18,8 +18,8 @@ NAMES = [f"{module}.{name}" for module in MODULES for name in getattr(importlib.
 API = Path(__file__).parents[1] / "docs" / "api"
 FIRST = ["agents", "archive", "refine", "mesh", "prefer"]
 """Settings of MACS that matter first."""
-COMPILED = "macs.AGEMOEA2"
-"""Its first use compiles what pymoo has of it."""
+QUICK = "macs.decisions.decide"
+"""The example of decisions that is quick enough; others solve a front each. The first use of AGEMOEA2 compiles what pymoo has of it."""
 
 
 def found(name: str) -> Any:
@@ -38,7 +38,11 @@ def test_a_public_name_is_documented(name: str) -> None:
     assert text["Parameters"] or text["Attributes"] or text["Methods"] or not takes, "it does not say what it takes"
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name == COMPILED)) for name in NAMES])
+def is_slow(name: str) -> bool:
+    return name == "macs.AGEMOEA2" or (name.startswith("macs.decisions") and name != QUICK)
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * is_slow(name)) for name in NAMES])
 def test_the_example_of_a_public_name_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")
