@@ -19,8 +19,8 @@ from .batch import file as studyfile
 from .batch.cells import Cell, combine
 from .batch.store import Store, StoredRun, Summary
 from .batch.terms import INNER, check_inner, sampling, written
-from .data.schema import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
 from .execution.task import Payload, Task
+from .files import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
 from .measures.references import ReferenceKey, check_reference
 from .report.changed.data import check as check_nominal
 from .report.changed.dispersions import check as check_dispersions

@@ -13,7 +13,7 @@ import pytest
 from runs.bench import KINDS, command, sources
 from runs.bench.measured import Row
 from runs.cli import main
-from runs.data.page_header import PageHeader, digest
+from runs.report.page_header import PageHeader, digest
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "docs" / "measured" / "check.py"

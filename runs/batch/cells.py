@@ -24,8 +24,8 @@ from problems.compiled import CompiledProblem
 from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription import Smooth, Transcription, stated, word
 
-from ..data.schema import errors_begin_with, plain
 from ..execution.task import Addressed, Payload
+from ..files import errors_begin_with, plain
 from .terms import check_terms, sampling, terms_of_problem
 
 STATEMENTS = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem

@@ -12,8 +12,7 @@ from typing import Any
 from macs.io.atomic import read_whole
 from problems.checks import unknown
 
-from ..data.addresses import check_trusted
-from ..data.schema import check_known, errors_begin_with
+from ..files import check_known, check_trusted, errors_begin_with
 from ..measures.references import reference_addresses
 
 STUDIES = Path(__file__).parents[1] / "studies"

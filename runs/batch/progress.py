@@ -13,7 +13,7 @@ import msgspec
 from macs.io.atomic import write_whole
 from problems.compiled import Objective
 
-from ..data.schema import checked, read_record, to_record
+from ..files import checked, read_record, to_record
 
 FILE = ".progress"
 """Its name, in the study's folder."""

@@ -36,11 +36,9 @@ from macs.io.atomic import read_whole, write_whole
 from macs.io.html import html_block, html_table
 from macs.io.text import duration, text_table
 
-from ..data.addresses import load_front
-from ..data.schema import Count, Natural, Positive, checked, errors_begin_with, read_record, to_record
 from ..execution.samples import History
-from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, samples_path
-from ..measures.simulation_record import SimulationRecord
+from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, SimulationRecord, samples_path
+from ..files import Count, Natural, Positive, checked, errors_begin_with, load_front, read_record, to_record
 from .cells import Cell
 
 MISSING, UNREADABLE = "missing", "unreadable"

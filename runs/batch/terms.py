@@ -12,7 +12,7 @@ from problems.compiled import CompiledProblem
 from transcription import Smooth
 from transcription.inner import NAMED
 
-from ..data.schema import Section, check_known, checked, errors_begin_with
+from ..files import Section, check_known, checked, errors_begin_with
 
 INNER = "auto"
 """The inner level where none is stated."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from macs.io.atomic import write_whole
 
-from ..data.page_header import PageHeader, digest
+from ..report.page_header import PageHeader, digest
 
 PLACES = {"front": "fronts", "generation": "scale.generation"} | dict.fromkeys(("many", "uf", "zdt", "constrained"), "functions")
 """Modules that are not called as the benchmark."""

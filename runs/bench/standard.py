@@ -15,8 +15,8 @@ from problems import load
 from problems.cases.standard import SHARE, Published, cases, published
 from problems.catalogue import STANDARD
 
-from ..data.memory import peak_memory
 from ..execution.apart import CRASHED, LATE, lines_apart
+from ..execution.memory import peak_memory
 from .measured import Column, Row, Target, short, table, verdicts
 
 RIGHT, WRONG, UNVERIFIED, FAILED = "right", "WRONG", "not verified", "FAILED"

@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
 
-from ..data.memory import is_memory_error, memory_message
+from ..execution.memory import is_memory_error, memory_message
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, deaf, ended_as_by_ctrl_c, ended_at_once
 
 EPILOG = """\

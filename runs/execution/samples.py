@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 from macs.io.atomic import write_whole
 from macs.search.rounds import PLANNED
 
-from ..data.schema import checked, read_record, to_record
+from ..files import checked, read_record, to_record
 
 COUNTS = ("evaluations", "inner_iterations", "gradient_solves", "work", "gradient_work")
 NUMBER = 30

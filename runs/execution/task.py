@@ -11,13 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
+import numpy as np
+
+from macs.fronts.verified import accuracy
 from macs.solvers.checkpoint import Unreadable, keeps
 from problems import load
 
-from ..data.memory import is_memory_error
-from ..measures.simulation_record import SimulationRecord, record
+from .memory import is_memory_error
 from .samples import Report, Samples
 
 if TYPE_CHECKING:
@@ -30,6 +32,14 @@ log = logging.getLogger(__name__)
 FINISHED, CRASHED, TIMEOUT, MEMORY, KILLED = "finished", "crashed", "timeout", "out of memory", "killed"
 
 Payload = tuple[bytes, bytes]
+FinalStates = Mapping[str, Mapping[str, np.ndarray]]
+"""{phase: {state: its final values (n,)}} of the n trajectories of a front."""
+
+
+class SimulationRecord(TypedDict, total=False):
+    """The "ends" of simulated trajectories: `FinalStates` as plain data. Empty if they were not simulated."""
+
+    ends: dict[str, dict[str, list[float]]]
 
 
 @dataclass(frozen=True)
@@ -71,7 +81,7 @@ class Outcome:
     # "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" at each sample: numbers, and the archive's objectives, all
     # minimised. The last sample is the front itself.
     history: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    # If the points of the front were simulated: see `simulation_record.record`.
+    # The final states of the points if they were simulated.
     simulated: SimulationRecord = field(default_factory=SimulationRecord, repr=False)
 
 
@@ -140,6 +150,27 @@ def _simulated(task: Task, front: Front) -> SimulationRecord:
     except Exception:
         log.warning("the points of a front could not be simulated; the report tries again", exc_info=True)
         return {}
+
+
+def record(front: Front, tolerance: float) -> SimulationRecord:
+    """The final states of a front's points when they are simulated as finely as to verify them within a tolerance."""
+    rtol, atol = accuracy(tolerance)
+    final = final_states(front.simulate(rtol=rtol, atol=atol))
+    return {"ends": {phase: {name: values.tolist() for name, values in states.items()} for phase, states in final.items()}}
+
+
+def final_states(front: Front) -> FinalStates:
+    """The final states of each phase of a front's n trajectories; empty where a point has none."""
+    trajectories = [point.trajectory for point in front if point.trajectory is not None]
+    if not trajectories or len(trajectories) < len(front):
+        return {}
+    return {
+        name: {
+            v.name: np.array([trajectory[name].edge_states[-1, k] for trajectory in trajectories])
+            for k, v in enumerate(phase.state_variables)
+        }
+        for name, phase in trajectories[0].items()
+    }
 
 
 @lru_cache(maxsize=8)

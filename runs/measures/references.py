@@ -23,7 +23,7 @@ from macs.pareto.dominance import nondominated
 from problems.catalogue import CASES
 from problems.compiled import Objective
 
-from ..data.schema import check_known, errors_begin_with
+from ..files import DATA_BYTES, check_known, errors_begin_with
 from .indicators import Points, described, goals_of, minimised
 
 if TYPE_CHECKING:
@@ -35,10 +35,6 @@ ReferenceKey = Annotated[
     str | dict[str, str] | None,
     Meta(description="'union', 'truth', the name of a case, a file, or one of these by problem"),
 ]
-
-
-LARGEST = 2**28
-"""Bytes that a table may have."""
 
 
 def union(fronts: Sequence[Points]) -> Points:
@@ -143,7 +139,7 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
 def _table(path: str | PathLike[str]) -> list[list[str]]:
     """The rows of a CSV file. Raises what `read` says."""
     try:
-        return list(csv.reader(io.StringIO(read_whole(path, LARGEST).decode("utf-8-sig"), newline="")))
+        return list(csv.reader(io.StringIO(read_whole(path, DATA_BYTES).decode("utf-8-sig"), newline="")))
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no file '{path}'") from None
     except OSError as error:

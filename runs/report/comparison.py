@@ -16,10 +16,9 @@ from macs.io.text import counted
 from macs.pareto.dominance import nondominated
 
 from ..batch.store import Store, StoredRun
-from ..data.schema import errors_begin_with
-from ..execution.task import CRASHED, MEMORY, TIMEOUT
+from ..execution.task import CRASHED, MEMORY, TIMEOUT, FinalStates, final_states, record
+from ..files import errors_begin_with
 from ..measures.references import Reference, look_up, union
-from ..measures.simulation_record import Ends, ends, record
 
 EACH = "each on its own"
 """Name of the transcription where each solver has its own."""
@@ -36,7 +35,7 @@ class Counting:
     """
 
     front: Front  # the n points that count
-    ends: Ends  # their states at the end of each phase
+    ends: FinalStates  # their states at the end of each phase
     # claimed, verified, feasible: Number of points that the solver returned, of those verified, and of those feasible when simulated,
     # dominated ones included.
     claimed: int
@@ -52,7 +51,7 @@ class Counting:
         """
         front = run.front
         if tolerance is None or not len(front):
-            return cls(front, ends(front), len(front), len(front), len(front))
+            return cls(front, final_states(front), len(front), len(front), len(front))
         final = run.simulated.get("ends", {})
         lengths = {len(values) for states in final.values() for values in states.values()}
         with errors_begin_with(f"the points of run {run.number} of {run.cell.name} cannot be simulated"):

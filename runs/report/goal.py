@@ -16,7 +16,7 @@ from msgspec import Meta
 from macs.front import Front
 
 from ..batch.store import StoredRun
-from ..data.schema import Number, Section, check_known, checked, errors_begin_with
+from ..files import Number, Section, check_known, checked, errors_begin_with
 from ..measures.convergence import Band, History, band
 from .comparison import Comparison
 from .plots import convergence_figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from macs.baselines.population import PopulationSolver
 
-from ..data.schema import check_known, checked, errors_begin_with
+from ..files import check_known, checked, errors_begin_with
 from .comparison import Comparison
 from .published_designs import Designs
 from .published_kinds import (

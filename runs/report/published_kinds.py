@@ -13,10 +13,10 @@ from macs.preferences import FuzzySatisfactory, Preference, Ranges, from_dict
 from problems.checks import unknown
 from problems.compiled import Objective
 
-from ..data.schema import Number, Section, Text, check_known, errors_begin_with, is_number
+from ..execution.task import FinalStates
+from ..files import Number, Section, Text, check_known, errors_begin_with, is_number
 from ..measures.indicators import hypervolume_at
 from ..measures.scale import Scale
-from ..measures.simulation_record import Ends as FinalStates
 from ..measures.statistics import summarise
 from .choices import chosen
 from .comparison import Comparison

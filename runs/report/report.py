@@ -20,8 +20,7 @@ from macs.io.console import Steps
 from macs.io.text import counted
 
 from ..batch.store import Store
-from ..data.addresses import check_trusted
-from ..data.schema import Flag, Text, checked, errors_begin_with
+from ..files import Flag, Text, check_trusted, checked, errors_begin_with
 from ..measures.attainment import attainment
 from ..measures.references import ReferenceKey, read, reference_addresses
 from .changed.data import ChangedData, changed_data

@@ -17,7 +17,7 @@ from macs.fronts.verified import unmarked
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.data.schema import from_record, to_record
+from runs.files import from_record, to_record
 from runs.report.comparison import Counting, comparisons
 from runs.report.published import papers, published_tables
 

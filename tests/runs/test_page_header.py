@@ -8,8 +8,8 @@ from datetime import date
 import pytest
 
 from macs.fronts.provenance import versions
-from runs.data import page_header
-from runs.data.page_header import PageHeader, digest
+from runs.report import page_header
+from runs.report.page_header import PageHeader, digest
 
 
 def test_header_as_written_is_read_again(tmp_path):

@@ -17,8 +17,8 @@ from macs.fronts.points import Points
 from runs import Study
 from runs.batch.store import Store
 from runs.cli import main
-from runs.data.page_header import PageHeader
 from runs.report.comparison import comparisons
+from runs.report.page_header import PageHeader
 from runs.report.run_measures import AXES, CHARGED, Charge, histories, spent
 from runs.report.tables import Column, table
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from runs.data.schema import Count, Number, Positive, Section, Text, checked, from_record, to_record
+from runs.files import Count, Number, Positive, Section, Text, checked, from_record, to_record
 
 
 class Bird(Section, tag="bird", tag_field="of"):

@@ -14,8 +14,8 @@ from macs import NSGA2
 from macs.fronts.files import to_bytes
 from runs import Study
 from runs.batch.store import Store, _difference, locked, reason
-from runs.data.schema import from_record, to_record
 from runs.execution.task import Outcome, samples_path
+from runs.files import from_record, to_record
 
 FRONT = black_box(4)
 

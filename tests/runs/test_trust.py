@@ -17,7 +17,7 @@ from problems.catalogue import CASES, is_catalogued
 from runs import Study
 from runs.batch.store import Store
 from runs.cli import main
-from runs.data.schema import from_record, to_record
+from runs.files import from_record, to_record
 
 MARK = "from pathlib import Path\nPath({mark!r}).touch()\ndef build(**data): Path({mark!r}).touch()\nreference = build\n"
 TOML = 'solvers = ["macs"]\nruns = 1\nseed = 1\nevaluations = 50\n'

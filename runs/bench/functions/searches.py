@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 from macs.front import Front
 
-from ...data.page_header import DIGITS, code
+from ...report.page_header import DIGITS, code
 from ...study import Study
 from .cases import Function, solvers
 

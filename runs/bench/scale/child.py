@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from multiprocessing import get_context
 
-from ...data.memory import peak_memory
+from ...execution.memory import peak_memory
 from .series import SERIES, Series
 
 ENOUGH = 4.0

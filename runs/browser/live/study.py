@@ -17,9 +17,9 @@ from problems.compiled import Objective
 
 from ...batch.progress import Progress, read_progress
 from ...batch.store import MISSING, StoredRun, Summary
-from ...data.schema import checked, read_record
 from ...execution.samples import History
 from ...execution.task import samples_path
+from ...files import checked, read_record
 from ...report.comparison import compared
 from ..points import goals_data
 from ..report import read_front

@@ -18,7 +18,7 @@ from macs.fronts.pictures.style import COLORS, better
 from macs.fronts.simulated import check_alike
 from problems.checks import unknown
 
-from ...data.schema import errors_begin_with
+from ...files import errors_begin_with
 from ..comparison import Comparison
 from ..flight_plots import representatives
 from ..style import COLUMN, PAGE, new_figure, style

@@ -11,7 +11,7 @@ import numpy as np
 from macs.front import Front
 from macs.fronts.pictures.style import COLORS, axis_label
 
-from ...data.schema import errors_begin_with
+from ...files import errors_begin_with
 from ...measures.references import module_of
 from ..comparison import Comparison
 from ..flight_plots import representatives

@@ -18,7 +18,7 @@ from macs.io.atomic import check_target, write_whole
 from macs.io.text import counted, duration
 
 from ...batch.store import Store, Summary
-from ...data.page_header import PageHeader, digest
+from ..page_header import PageHeader, digest
 from ..tables import Table
 
 if TYPE_CHECKING:

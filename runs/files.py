@@ -1,4 +1,4 @@
-"""Plain data of files: schemas, checked by msgspec, and records, which have a checksum.
+"""Files of plain data: schemas, checked by msgspec; records, which have a checksum; and which code that files name may be loaded.
 
 Errors are one line: the place, the value, what it must be, and the nearest known word.
 """
@@ -12,6 +12,7 @@ import sys
 import types
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 from zlib import crc32
@@ -19,35 +20,19 @@ from zlib import crc32
 import msgspec
 from msgspec import Meta
 
+from macs.front import Front
 from macs.io.atomic import read_whole
+from problems.catalogue import is_catalogued
 from problems.checks import unknown
 
-LONGEST = 80
-"""Characters of a value in a message."""
+DATA_BYTES = 2**28
+"""Bytes that the file of a record or of a table may have: those of large studies have some 10^6."""
 
-
-LARGEST_RECORD = 2**28
-"""Bytes that the file of a record may have."""
-
-
-LARGEST = sys.float_info.max
-
-
-Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST, description="a finite number")]
-
-
-Positive = Annotated[float, Meta(gt=0, le=LARGEST, description="a positive number")]
-
-
+Number = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max, description="a finite number")]
+Positive = Annotated[float, Meta(gt=0, le=sys.float_info.max, description="a positive number")]
 Count = Annotated[int, Meta(ge=1, description="a whole number of at least 1")]
-
-
 Natural = Annotated[int, Meta(ge=0, description="a whole number of at least 0")]
-
-
 Text = Annotated[str, Meta(description="a text")]
-
-
 Flag = Annotated[bool, Meta(description="true or false")]
 
 
@@ -84,7 +69,7 @@ def _in_words(error: str, data: Any, kind: Any, name: str) -> str:
         tags = {} if isinstance(_member(kind, data), type) else _tags(kind)
         return f"{before}{field[1]} {'must be one of ' if tags else 'is missing'}{', '.join(tags)}"
     if text.startswith(("Expected", "Invalid")):
-        return f"{place or name} must be {_description(kind)}, not {repr(data)[:LONGEST]}"
+        return f"{place or name} must be {_description(kind)}, not {repr(data)[:80]}"  # a long value is cut
     return f"{before}{text}"  # from a `__post_init__`, in words already
 
 
@@ -182,8 +167,26 @@ def from_record(data: bytes) -> Any:
 
 def read_record(path: Path) -> Any:
     """The content of the file of a record. Raises OSError if it cannot be read or is no ordinary file, ValueError if it is no record."""
-    return from_record(read_whole(path, LARGEST_RECORD))
+    return from_record(read_whole(path, DATA_BYTES))
 
 
 def _checksum(content: Any) -> int:
     return crc32(json.dumps(content).encode())
+
+
+def check_trusted(address: str, trust: bool, where: str) -> None:
+    """Raise ValueError if a file names an address that must not be loaded."""
+    if ":" in address and not trust and not is_catalogued(address):
+        raise ValueError(
+            f"{where} names '{address}', which is not in the catalogue and runs code of its own when loaded: "
+            "if you trust it, give --trust, or trust=True in Python"
+        )
+
+
+def load_front(path: str | PathLike[str], trust: bool) -> Front:
+    """A saved front whose problem may be loaded from its address. Raises ValueError or FileNotFoundError as `Front.load`, and ValueError
+    for an address that is not trusted."""
+    front = Front.load(path, trust=trust)
+    if front.source is not None and front.source.address:
+        check_trusted(front.source.address, trust, f"'{path}'")
+    return front
