@@ -15,7 +15,7 @@ from macs.preferences.pictures import draw_degrees
 
 from .comparison import Comparison
 from .flight_plots import flights_figure
-from .style import COLUMN, PAGE, legend, new_figure, style
+from .plots import COLUMN, PAGE, legend, new_figure, style
 from .tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:

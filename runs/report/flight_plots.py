@@ -17,7 +17,7 @@ from macs.fronts.point import Point
 from macs.pareto.energy import spread
 
 from ..measures.indicators import normalised
-from .style import COLUMN, PAGE, new_figure, style
+from .plots import COLUMN, PAGE, new_figure, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -24,8 +24,7 @@ from ..measures.indicators import pieces, truth
 from ..measures.references import Reference, module_of
 from .comparison import Comparison
 from .flight_plots import Law, flights_figure, paths_figure, representatives
-from .plots import front_figure
-from .style import style
+from .plots import front_figure, style
 from .tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from problems.compiled import Objective
 from runs.measures.attainment import attainment
 from runs.measures.references import foreign
 from runs.report.flight_plots import flights_figure, paths_figure, representatives
-from runs.report.plots import attainment_figure, convergence_figure, front_figure
-from runs.report.style import legend, new_figure
+from runs.report.plots import attainment_figure, convergence_figure, front_figure, legend, new_figure
 
 GOALS = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
 A = np.array([[1.0, 1.0], [3.0, 3.0]])

@@ -21,7 +21,7 @@ from problems.checks import unknown
 from ...files import errors_begin_with
 from ..comparison import Comparison
 from ..flight_plots import representatives
-from ..style import COLUMN, PAGE, new_figure, style
+from ..plots import COLUMN, PAGE, new_figure, style
 from ..tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:

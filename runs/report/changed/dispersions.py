@@ -15,7 +15,7 @@ from ...files import errors_begin_with
 from ...measures.references import module_of
 from ..comparison import Comparison
 from ..flight_plots import representatives
-from ..style import PAGE, new_figure, style
+from ..plots import PAGE, new_figure, style
 from ..tables import Cell, Column, Table, table
 
 if TYPE_CHECKING:
