@@ -22,7 +22,7 @@ from .fronts.points import Points
 from .fronts.provenance import more_costs, versions
 from .gradient_solvers import GradientSolver
 from .gradient_tools import AUTO, Terms, check_starts, sweep
-from .gradients.multistart import MOST_ITERATIONS
+from .gradients.scalarised import MOST_ITERATIONS
 from .preferences import FuzzySatisfactory, Preference, Ranges, from_dict, to_dict
 
 KEYS = ("method", "settings", "vary", "loop")

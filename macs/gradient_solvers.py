@@ -20,7 +20,7 @@ from .front import Front
 from .fronts.builders import nearest_violation
 from .fronts.verified import VERIFY
 from .gradient_tools import AUTO, check_starts, optimize, payoff, sweep
-from .gradients.targets import METHODS, check_points
+from .gradients.ends import METHODS, check_points
 from .solvers.solver import Solver
 from .solvers.start import check_run, drawing
 

@@ -34,11 +34,9 @@ from .fronts.point import Point
 from .fronts.points import Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
-from .gradients.along import ROUNDS, along
-from .gradients.lexicographic import lexicographic_ends
-from .gradients.multistart import MOST_ITERATIONS, GradientSolves, MultistartSolver, single_task
-from .gradients.starts import Census
-from .gradients.targets import METHODS, check_points, targets
+from .gradients.ends import ENDS, METHODS, check_points, lexicographic_ends, solve_tasks, tasks_between
+from .gradients.multistart import MultistartSolver, MultistartStopping
+from .gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
 from .io.console import working
 from .pareto.ranges import BETTER, distinct
 from .refinement.found_optimum import COARSE, found_optimum
@@ -48,9 +46,8 @@ from .refinement.mesh_loop import MeshLoop, Programs
 from .refinement.search_mesh import default_transcription, search_transcription
 from .solvers.start import beginning, check_run
 
-PART, MESHES, MOST_WORK = 0.1, 8, 1.5e6
-"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it; work, in iterations times variables,
-after which no other mesh is begun: some half a minute, more where programs are large."""
+PART, MESHES = 0.1, 8
+"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it."""
 AUTO = "auto"
 """As many starts as pay."""
 
@@ -296,13 +293,15 @@ class _Job:
         self._about = {"name": name, "settings": {**settings, **terms.settings}}
         self._stopped = ""
         self._sole: np.ndarray | None = None
-        self._census: dict[int, Census] = {}
+        self._stopping: dict[int, MultistartStopping] = {}
         self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
         self._began = time.perf_counter()
         if transcription is not None:
             self.begin(transcription)
 
-    def begin(self, transcription: Transcription, ends: Points | None = None, census: Mapping[int, Census] | None = None) -> None:
+    def begin(
+        self, transcription: Transcription, ends: Points | None = None, stopping: Mapping[int, MultistartStopping] | None = None
+    ) -> None:
         """Work on this transcription from now on, with what is known of the ends on another mesh."""
         self.nlp = transcription.transcribe(self.problem)
         check_freedom(self.nlp)
@@ -310,8 +309,8 @@ class _Job:
         known = [beginning(self._terms.start, self.nlp), beginning(ends, self.nlp, guess=False)]
         given = [Z for Z in known if Z is not None]
         self.solver = MultistartSolver(self.nlp, np.vstack(given) if given else None, self._terms.count, self._rng, self.solves)
-        self.solver.census.update(census or {})
-        self._census = self.solver.census
+        self.solver.stopping.update(stopping or {})
+        self._stopping = self.solver.stopping
 
     def run(self, work: Callable[[], Front], again: Callable[[Points, float], Points]) -> Front:
         """The front that `work` returns, on the transcription that was given or on one that is found, simulated.
@@ -326,7 +325,7 @@ class _Job:
                 if not self.fixed:
                     chosen = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
                     self.solves.counts = chosen.counts
-                    self.begin(chosen.fine or chosen.search, chosen.ends, chosen.census)
+                    self.begin(chosen.fine or chosen.search, chosen.ends, chosen.stopping)
                 front = work()
             except Stopped as reason:
                 self._stopped = str(reason)
@@ -338,8 +337,8 @@ class _Job:
 
     def optimum(self, i: int) -> Front:
         """The optimum of objective i as a front of one point, simulated: on the given transcription, or on a mesh that is found for it."""
-        reference, weights = single_task(i, len(self.problem.goals))
-        self._sole = reference < np.inf
+        task = Scalarised.single(i, len(self.problem.goals))
+        self._sole = task.used
         if self.fixed:
             return self.run(lambda: self.front([self.solver.single(i)], None), solved_again)
         terms, verify = self._terms, self._terms.verify
@@ -348,9 +347,9 @@ class _Job:
         with working(terms.time_limit, terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
-            loop = MeshLoop(Programs(self.problem), self.solves, wanted, MESHES, MOST_WORK)
+            loop = MeshLoop(Programs(self.problem), self.solves, wanted, MESHES, WORK.most)
             try:
-                found = found_optimum(loop, reference, weights, partial(beginning, terms.start), terms.count, self._rng, coarse)
+                found = found_optimum(loop, task, partial(beginning, terms.start), terms.count, self._rng, coarse)
             except Stopped as reason:
                 words = f"{self._about['name']}: {reason} before the first solve"
                 raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
@@ -370,11 +369,11 @@ class _Job:
 
     def swept(self, points: int, method: str) -> Front:
         """The front of a sweep; its ends alone if one of them was not found."""
-        for _ in range(ROUNDS):
+        for _ in range(ENDS.from_rivals):
             ends = self.ends()
             if any(end.status != CONVERGED for end in ends):
                 return self.sifted(ends)
-            found = along(self.solver, targets(np.array([end.F for end in ends]), self.ranges(ends), points, method))
+            found = solve_tasks(self.solver, tasks_between(np.array([end.F for end in ends]), self.ranges(ends), points, method))
             if not self.surpassed(ends, found):
                 break
         return self.sifted([*ends, *found], self.ranges(ends))
@@ -423,8 +422,8 @@ class _Job:
 
     def _found_once(self) -> str:
         """Words on optima of single objectives that one start alone has found."""
-        once = [i for i, census in self._census.items() if census.times() == 1 < census.starts]
-        names = [f"that of '{self.problem.goals[i].name}' in {self._census[i].starts}" for i in once]
+        once = [i for i, stopping in self._stopping.items() if stopping.hits() == 1 < stopping.starts]
+        names = [f"that of '{self.problem.goals[i].name}' in {self._stopping[i].starts}" for i in once]
         return f"optima that one start alone found, so that there may be better ones: {', '.join(names)}" if names else ""
 
     def _stats(self) -> dict[str, Any]:
@@ -442,8 +441,8 @@ class _Job:
     def _starts(self) -> dict[str, Any]:
         """Starts that were made, different optima and how often the best was found: of the only objective that was sought, or by name."""
         told = {
-            self.problem.goals[i].name: {"starts": one.starts, "optima": one.optima(), "found": one.times()}
-            for i, one in self._census.items()
+            self.problem.goals[i].name: {"starts": one.starts, "optima": one.optima(), "found": one.hits()}
+            for i, one in self._stopping.items()
         }
         if self._sole is not None:
             return next(iter(told.values()), {})

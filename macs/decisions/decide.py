@@ -14,7 +14,7 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..gradient_tools import Terms
-from ..gradients.multistart import MOST_ITERATIONS
+from ..gradients.scalarised import MOST_ITERATIONS
 from ..preferences import Preference, Ranges
 from .choice import Choice
 from .desk import Desk

@@ -26,7 +26,7 @@ from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import MISSES, VERIFY, objective_scales, verified
 from ..gradient_tools import AUTO, Terms, meshes_to_begin_on, payoff
 from ..gradients.front_polish import KEPT_INSIDE
-from ..gradients.multistart import GradientSolves
+from ..gradients.scalarised import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
 from ..preferences.preference import BEYOND, CONFIRMED, standing

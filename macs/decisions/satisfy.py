@@ -16,7 +16,7 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..gradient_tools import Terms
-from ..gradients.multistart import MOST_ITERATIONS
+from ..gradients.scalarised import MOST_ITERATIONS
 from ..preferences import FuzzySatisfactory, Ranges, Stage
 from .choice import Choice
 from .decide import check_statement

@@ -21,15 +21,16 @@ from ..fronts.builders import certified, vectors_points
 from ..fronts.points import Points
 from ..fronts.provenance import costs
 from ..fronts.verified import unmarked
-from ..gradient_tools import MESHES, MOST_WORK, PART
-from ..gradients.multistart import GradientSolves, MultistartSolver
+from ..gradient_tools import MESHES, PART
+from ..gradients.multistart import MultistartSolver
+from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..preferences import Stage
 from ..refinement.found_optimum import found_optimum
 from ..refinement.mending import solved_again
 from ..refinement.mesh_loop import MeshLoop, Programs
 
-REFERENCE, WEIGHTS = np.zeros(1), np.ones(1)
-"""Of a problem with one objective, which is minimised; see `scalarize`."""
+MINIMUM = Scalarised.single(0, 1)
+"""Of a problem with one objective, which is minimised."""
 ROOM = 10.0
 """By how many times their ranges objectives may leave these, and all values that are known, at first."""
 WIDENED = 3
@@ -127,7 +128,7 @@ class StageSolver:
         for widened in range(WIDENED + 1):
             known = known_on(meshes[0])
             derived = self._derived(stage, (), known)
-            loop = MeshLoop(Programs(derived.problem), self.solves, wanted, MESHES, MOST_WORK)
+            loop = MeshLoop(Programs(derived.problem), self.solves, wanted, MESHES, WORK.most)
             first = loop.programs(meshes[0])
             begun = self._multistart(derived, first, known, starts)
 
@@ -137,7 +138,7 @@ class StageSolver:
                 one = known_on(nlp.transcription)  # type: ignore[arg-type]
                 return derived.lifted(one.nlp.variables, nlp.variables, one.Z, one.F)
 
-            found = found_optimum(loop, REFERENCE, WEIGHTS, given, 1, self.rng, meshes)
+            found = found_optimum(loop, MINIMUM, given, 1, self.rng, meshes)
             own = found.nlp.transcription.transcribe(self.problem)
             outcome = self._outcome(stage, True, derived, found.nlp, own, found.z, found.status, found.note)
             if widened == WIDENED or found.status != CONVERGED or not self._widened(derived, found.nlp, found.z):
@@ -204,12 +205,12 @@ class StageSolver:
         found: list[Solved] = []
         for k in range(starts):
             try:
-                found.append(solver.from_vector(Z[k], REFERENCE, WEIGHTS) if k < len(Z) else solver.from_drawn(REFERENCE, WEIGHTS))
+                found.append(solver.from_vector(Z[k], MINIMUM) if k < len(Z) else solver.from_drawn(MINIMUM))
             except Stopped:
                 if not found:
                     raise
                 break
-        return solver.better(found, REFERENCE, WEIGHTS)
+        return solver.better(found, MINIMUM)
 
     def _outcome(self, stage: Stage, first: bool, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str) -> Outcome:
         """What was found, as a vector of the problem itself."""

@@ -17,6 +17,7 @@ from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
 from ..evaluation.reevaluated import evaluated_again
+from ..pareto.ranges import CONSTANT, objective_units, stated_scales
 from .points import Points
 
 Kind = TypeVar("Kind", bound=Points)
@@ -27,8 +28,6 @@ PART = 1e-4
 """Error of the integrator, as a fraction of what a point may miss."""
 COARSEST, FINEST = 1e-7, 1e-12
 """Relative tolerances of the integrator."""
-CONSTANT = 1e-6
-"""An objective that varies less over a front, as a fraction of its size, is judged by its size."""
 NOTHING = 1e-6
 """Smallest scale of an objective, as a fraction of how much it varies within the bounds of the problem."""
 MISSES, AGAIN = "simulated, ", "evaluated again, "
@@ -199,24 +198,22 @@ def accuracy(tolerance: float) -> tuple[float, float]:
 def objective_scales(points: Points) -> np.ndarray:
     """What counts as one in each objective (m,): the scale that was stated, or the range over the feasible points; the size of one that
     hardly varies; and at least a small part of how much it varies within the bounds of the problem, if that is known."""
-    sizes, ranges, least = _variation(points)
-    found = np.maximum(np.where(ranges > CONSTANT * sizes, ranges, sizes), least)
-    given = np.array([goal.scale or 0.0 for goal in points.goals])
-    return np.where(given > 0.0, given, np.where(found > 0.0, found, 1.0))
+    F, least = _variation(points)
+    return objective_units(F, stated_scales(points.goals), least)
 
 
 def constant_objectives(points: Points) -> np.ndarray:
     """Mask (m,) of the objectives that are the same at all feasible points, but for what no solver can tell apart."""
-    sizes, ranges, least = _variation(points)
-    return ranges <= np.maximum(CONSTANT * sizes, least)
+    F, least = _variation(points)
+    return np.ptp(F, axis=0) <= np.maximum(CONSTANT * np.abs(F).max(axis=0), least)
 
 
-def _variation(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each objective (m,): its largest size and its range over the feasible points, and the smallest scale that it may have."""
+def _variation(points: Points) -> tuple[np.ndarray, np.ndarray]:
+    """The objectives (k, m) of the feasible points, and the smallest scale (m,) that each may have."""
     good = (points.status == CONVERGED) & np.isfinite(points.F).all(axis=1)
     F = points.F[good] if good.any() else np.zeros((1, len(points.goals)))
     least = NOTHING * objective_spreads(points.problem) if isinstance(points.problem, CompiledProblem) else np.zeros(F.shape[1])
-    return np.abs(F).max(axis=0), np.ptp(F, axis=0), least
+    return F, least
 
 
 def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:

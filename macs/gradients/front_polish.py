@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,8 +36,7 @@ from ..pareto.archive import Archive
 from ..pareto.dominance import nondominated
 from ..pareto.energy import Guide, spread
 from ..pareto.ranges import ranges
-from .counted import CountedSolves
-from .polish import polish
+from .polish import BudgetedSolves, polish
 
 KEPT_INSIDE = "kept inside its limits, so that it is feasible when simulated"
 """Note of a point that was solved with tightened limits."""
@@ -74,7 +74,7 @@ def polished(
             return front.replace(stats=more_costs(front.stats, Counts(), interrupts.elapsed, str(reason)))
         evaluator = Bilevel(nlp, Propagate(), float(front.stats["tolerance"]))
         evaluator.before_batch = lambda: show(f"polish: {evaluator.counts.gradient_solves} of at most {solves} gradient solves done")
-        left = CountedSolves(evaluator, solves)
+        left = BudgetedSolves(evaluator, solves)
         begun = _archive(nlp, known, evaluator.tolerance) if len(known) else _made_feasible(nlp, front.closest, left)
         if not len(begun):
             return front.replace(stats=more_costs(front.stats, evaluator.counts, interrupts.elapsed, interrupts.reason))
@@ -107,7 +107,7 @@ def _archive(nlp: NLP, known: Points, tolerance: float) -> Archive:
     return Archive(np.array(starts), known.F, np.minimum(known.violation, tolerance))
 
 
-def _made_feasible(nlp: NLP, closest: Point | None, solves: CountedSolves) -> Archive:
+def _made_feasible(nlp: NLP, closest: Point | None, solves: BudgetedSolves) -> Archive:
     """An archive of one point, by a solve from the least infeasible point; empty if that fails."""
     if closest is None or closest.trajectory is None or not np.isfinite([*closest.F, closest.violation]).all():
         return Archive(np.empty((0, len(nlp.variables))), np.empty((0, len(nlp.problem.goals))), np.empty(0))
@@ -115,21 +115,21 @@ def _made_feasible(nlp: NLP, closest: Point | None, solves: CountedSolves) -> Ar
     return Archive.of(found, found.status == CONVERGED)
 
 
-ROUNDS = 3
-"""Largest number of times that a point is solved with tightened limits."""
+@dataclass(frozen=True)
+class BackOffLimits:
+    """How limits are tightened."""
+
+    rounds: int = 3  # most times that a point is solved with tightened limits
+    more: float = 1.2  # limits are tightened by so many times the excess, which may be a little larger at the new point
+    integrator: float = 1e-4  # its largest error, as a fraction of the excess that is allowed
 
 
-MORE = 1.2
-"""Limits are tightened by so many times the excess, which may be a little larger at the new point."""
-
-
-PART = 1e-4
-"""Largest error of the integrator, as a fraction of the excess that is allowed."""
+BACK_OFF = BackOffLimits()
 
 
 def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vectors of which those that are infeasible when simulated have been solved again with tightened limits. Z (k, D), ranges (m,) -> (k,
-    D), (k,), (k,)."""
+    """Vectors (k, D) of which those that are infeasible when simulated have been solved again with tightened limits; and masks (k,) of
+    those that are feasible, and that were moved. Z (k, D), ranges (m,)."""
     nlp, Z = evaluator.nlp, Z.copy()
     F = nlp.evaluate(Z)[0] if len(Z) else np.empty((0, len(ranges)))
     margins = np.zeros((len(Z), len(nlp.g_scale)))
@@ -137,7 +137,7 @@ def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: floa
     waiting = np.arange(len(Z))
     # What was solved again, but not simulated when the work is to end, does not count as feasible.
     with suppress(Stopped):
-        for _ in range(ROUNDS):
+        for _ in range(BACK_OFF.rounds):
             waiting = _infeasible(nlp, Z, waiting, margins, feasible, verify)
             if not len(waiting):
                 break
@@ -156,7 +156,7 @@ def _infeasible(nlp: NLP, Z: np.ndarray, waiting: np.ndarray, margins: np.ndarra
     simulations = simulate_all(nlp.problem, [nlp.unpack(z) for z in Z[waiting]], rtol=rtol, atol=atol)
     feasible[waiting] = [simulation.violation <= verify for simulation in simulations]
     for row, simulation in zip(waiting, simulations, strict=True):
-        margins[row] += MORE * _by_row(simulation.violations, nlp.g_labels)
+        margins[row] += BACK_OFF.more * _by_row(simulation.violations, nlp.g_labels)
     return waiting[~feasible[waiting]]
 
 
@@ -186,5 +186,5 @@ def feasible_when_simulated(found: np.ndarray, known: Points, verify: float) -> 
 
 def _accuracy(verify: float) -> tuple[float, float]:
     """Tolerances rtol and atol of the integrator, fine enough to detect an excess of `verify`."""
-    accuracy = min(PART * verify, PART)
+    accuracy = BACK_OFF.integrator * min(verify, 1.0)
     return accuracy, 0.1 * accuracy

@@ -1,87 +1,165 @@
-"""Gradient solves of scalarised problems, each counted: alone, and the best from several starts."""
+"""The best of gradient solves of a scalarised problem from several starts.
+
+A solve ends in the valley in which it begins. Trajectories of most controls drawn at random are much alike, so that starts are of several
+kinds; near the best that is known other valleys are often better ones. That is monotonic basin hopping: Leary, "Global optimization on
+funneling landscapes", J. Global Optimization 18, 2000; for trajectories Englander and Conway, "Automated solution of the low-thrust
+interplanetary trajectory problem", J. Guidance 40(1), 2017. When to end: after k solves that found w different
+optima, the probability that the next one finds another is w (w + 1) / (k (k - 1)), if before the first all numbers of optima, and all sizes
+of their valleys, were alike: Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical
+Programming 37, 1987.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from transcription.base import INFEASIBLE, NLP
 from transcription.nlp.derivatives import linear_objectives, objective_gradients
-from transcription.nlp.elastic import least_violation
-from transcription.nlp.scalarized import Solved, scalarize
+from transcription.nlp.scalarized import Solved
 from transcription.nlp.scaling import nlp_scales
+from transcription.smooth import Smooth
 from transcription.stopping import stopping
 
-from ..evaluation.evaluator import CONVERGED, Counts
-from .starts import UNSEEN, Census, Starts
-
-LIMIT, BETTER = 1e-8, 1e-7
-"""Fraction of an objective's range by which its limit may be exceeded; difference in alpha by which a result is clearly better."""
+from ..evaluation.evaluator import CONVERGED
+from .scalarised import WORK, GradientSolves, Scalarised
 
 
-MOST_ITERATIONS = 500
-"""Iterations of IPOPT after which a strategy of a solve is given up by default."""
+@dataclass(frozen=True)
+class MultistartLimits:
+    """When results differ, and when starts are enough."""
+
+    excess: float = 1e-8  # part of an objective's range by which its limit may be exceeded
+    clearly: float = 1e-7  # difference in alpha by which a result is clearly better: the accuracy of solves
+    iterations: int = 200  # most of each further start
+    infeasible: tuple[int, int] = (8, 16)  # fewest and most starts without a feasible vector; between them, what took `WORK.little`
+    everywhere: int = 3  # starts from everywhere before only each second one is: the others are near the best that is known
+    hopeless: float = 100.0  # scales by which propagated states violate constraints so that the states of the guess are the better start
+    unseen: float = 0.005  # probability that another start would find another optimum below which there are enough
+    fewest: int = 8  # solves after which none has converged that are enough
+    many: int = 60  # where optima are many: solves that are enough, if there are also `last` times as many as it took to find the best
+    last: int = 2
+    most: int = 200
+    same: float = 1e-3  # losses that differ by less are of one optimum: as a part of the differences between all optima,
+    rounding: float = 1e-5  # and of their size
 
 
-SHORT, LITTLE = 200, 6e5
-"""Most iterations of each further start; work, see `Counts`, that they may always take together, a matter of a second or two."""
+MULTISTART = MultistartLimits()
+
+ALMOST_CONSTANT, SLOW = Smooth(spread=1.0, length=3.0), Smooth(spread=1.0, length=0.3)
+KINDS: tuple[tuple[Smooth | None, bool], ...] = (
+    (ALMOST_CONSTANT, True),
+    (SLOW, True),
+    (None, True),
+    (ALMOST_CONSTANT, True),
+    (SLOW, True),
+    (Smooth(spread=0.3), False),
+)
+"""How controls are drawn, and whether states are propagated from them: far from the middle of their bounds and mostly on them, since
+trajectories of others are much alike; None evenly, each value by itself; and smooth about the middle with the states of the guess, from
+which a solve also finds what nothing that is propagated comes near to."""
+SPREADS, LENGTHS, WINDOWS = (0.02, 1.0), (0.05, 2.0), (0.05, 1.0)
+"""Least and largest spread, in spans of the bounds, and length, of deviations from the best that is known, see `Smooth`; and of the part of
+a phase in which controls deviate: what else there is to a good solution stays as it is."""
 
 
-TRIED = (8, 16)
-"""Fewest and most starts from which no feasible vector is found before the search for one ends; between them, what took `LITTLE`."""
+class Starts:
+    """Starts of gradient solves of one NLP, later every second near the best vector that is known."""
+
+    def __init__(self, nlp: NLP, rng: np.random.Generator, drawn: int = 0) -> None:
+        self._nlp, self._rng, self.drawn = nlp, rng, drawn
+
+    def draw(self, best: np.ndarray | None = None) -> np.ndarray:
+        """The next start, a full vector; `best` (n,) is the best that is known. Returns (1 or 2, n)."""
+        nlp, rng, first = self._nlp, self._rng, MULTISTART.everywhere
+        drawn, self.drawn = self.drawn, self.drawn + 1
+        lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
+        candidates = (lower + rng.random(len(lower)) * span)[None]
+        if drawn >= first and (drawn - first) % 2 and best is not None:
+            return self._propagated(self._moved(best, candidates))[:1]
+        shape, propagate = KINDS[(drawn if drawn < first else first + (drawn - first) // 2) % len(KINDS)]
+        guessed = nlp.first_guess(candidates if shape is None else shape.shaped(nlp, candidates))[0]
+        return self._propagated(guessed) if propagate else guessed[None]
+
+    def _moved(self, best: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+        """The vector (n,) with a random deviation of its free variables, of controls in a part of each phase."""
+        nlp = self._nlp
+        spread, length, width = (float(np.exp(self._rng.uniform(*np.log(limits)))) for limits in (SPREADS, LENGTHS, WINDOWS))
+        middle, about = self._rng.random(), best[nlp.free]
+        deviation = Smooth(spread, length).shaped(nlp, candidates, about)[0] - about
+        for profile in nlp.profiles:
+            deviation[profile.columns] *= np.exp(-(((profile.places - middle) / width) ** 2))
+        moved = best.copy()
+        moved[nlp.free] += deviation
+        return moved
+
+    def _propagated(self, z: np.ndarray) -> np.ndarray:
+        """The vector with propagated states, unless these are absurd, and as it is."""
+        states = self._nlp.propagate(z[None])
+        usable = np.isfinite(states).all() and self._nlp.evaluate(states)[1][0] <= MULTISTART.hopeless
+        return np.vstack([states, z]) if usable else z[None]
 
 
-class GradientSolves:
-    """Gradient solves with one tolerance, which are counted."""
+class MultistartStopping:
+    """What solves of one problem from different starts led to, how many optima and how often the best, and whether there were enough."""
 
-    def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
-        self.tolerance, self.max_iterations = tolerance, max_iterations
-        self.counts, self._persistent, self._near = Counts(), True, False
-        self.before: Callable[[], None] = lambda: None
+    def __init__(self, unseen: float = MULTISTART.unseen) -> None:
+        self._losses: list[float] = []
+        self.starts = 0
+        self._last, self._unseen = 0, unseen
 
-    def __call__(
-        self, nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None
-    ) -> Solved:
-        """The result of one solve from a vector (n,); see `scalarize` for reference, weights and ceiling (m,)."""
-        self.before()
-        limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations, "persistent": self._persistent}
-        return self._counted(nlp, scalarize(nlp, start, reference=reference, weights=weights, ceiling=ceiling, near=self._near, **limits))
+    def add(self, loss: float | None) -> bool:
+        """Count a solve that ended at an optimum with this loss, less is better, or at none; returns whether it is the best so far."""
+        self.starts += 1
+        if loss is None:
+            return False
+        better = not self._losses or loss < min(self._losses) - MULTISTART.rounding * abs(loss)
+        self._losses.append(loss)
+        self._last = self.starts if better else self._last
+        return better
 
-    def least_violation(self, nlp: NLP, start: np.ndarray) -> Solved:
-        """What is feasible, or violates least, near a vector (n,); see `least_violation`."""
-        self.before()
-        return self._counted(nlp, least_violation(nlp, start, tolerance=self.tolerance))
+    @property
+    def converged(self) -> int:
+        """Solves that ended at an optimum."""
+        return len(self._losses)
 
-    def _counted(self, nlp: NLP, solved: Solved) -> Solved:
-        self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
-        return solved
+    def optima(self, same: float | None = None) -> int:
+        """Optima that differ by more than `same`; by default, by more than a small part of the differences between all."""
+        apart = np.diff(np.sort(self._losses)) > (self._same if same is None else same)
+        return int(np.count_nonzero(apart)) + bool(self._losses)
 
-    @contextmanager
-    def at_most(self, iterations: int) -> Iterator[None]:
-        """Solves within take no more iterations than these, of which the first strategy may take all."""
-        usual = self.max_iterations
-        self.max_iterations, self._persistent = min(usual, iterations), False
-        try:
-            yield
-        finally:
-            self.max_iterations, self._persistent = usual, True
+    def hits(self, loss: float | None = None, same: float | None = None) -> int:
+        """How often an optimum with this loss was found, by default the best."""
+        if not self._losses:
+            return 0
+        differences = np.abs(np.array(self._losses) - (min(self._losses) if loss is None else loss))
+        return int(np.count_nonzero(differences <= (self._same if same is None else same)))
 
-    @contextmanager
-    def nearby(self) -> Iterator[None]:
-        """Solves within look near their starts only; see `scalarize`."""
-        self._near = True
-        try:
-            yield
-        finally:
-            self._near = False
+    @property
+    def enough(self) -> bool:
+        """Whether more starts are not expected to find anything else, or have found nothing better for long."""
+        found, optima = self.converged, self.optima()
+        if not found:
+            return self.starts >= MULTISTART.fewest
+        unseen = self._unseen if optima == 1 else MULTISTART.unseen
+        if found > optima and optima * (optima + 1) <= unseen * found * (found - 1):
+            return True
+        return self.starts >= min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most)
+
+    @property
+    def _same(self) -> float:
+        losses = np.array(self._losses)
+        if not len(losses):
+            return 0.0
+        return max(MULTISTART.same * float(np.ptp(losses)), MULTISTART.rounding * float(np.abs(losses).max()))
 
 
 class MultistartSolver:
-    """Solver of scalarised problems of one NLP, each from the best vector known for it and from other starts, see `starts`. given (k,
-    n)."""
+    """Solver of scalarised problems of one NLP, each from the best vector that is known for it and from other starts; given (k, n).
+
+    With `starts` None, an optimum of one objective is sought from as many starts as pay; see `MultistartStopping`.
+    """
 
     def __init__(
         self,
@@ -90,60 +168,73 @@ class MultistartSolver:
         starts: int | None,
         rng: np.random.Generator,
         solves: GradientSolves,
+        unseen: float = MULTISTART.unseen,
+        most: float = np.inf,
     ) -> None:
-        self.nlp, self.starts, self.tolerance = nlp, starts, solves.tolerance
-        self.solves, self._starts = solves, Starts(nlp, rng)
-        self.rng, self.census, self.most, self.unseen = rng, dict[int, Census](), np.inf, UNSEEN
-        self.closest: Solved | None = None
+        self.nlp, self.starts, self.solves, self.rng = nlp, starts, solves, rng
+        self.stopping, self.most, self._unseen = dict[int, MultistartStopping](), most, unseen
+        self.closest: Solved | None = None  # what violates least, where nothing is feasible
+        self._starts = Starts(nlp, rng)
         self._known = np.empty((0, len(nlp.variables))) if given is None else given
         self._given = len(self._known)
-        self._F: np.ndarray = np.empty((0, len(nlp.problem.goals)))
-        self._violation: np.ndarray = np.empty(0)
+        self._F, self._violation = np.empty((0, len(nlp.problem.goals))), np.empty(0)
         if given is not None:
             self._F, self._violation = nlp.evaluate(given)
-
-    @property
-    def counts(self) -> Counts:
-        """Gradient solves, iterations, failures by status."""
-        return self.solves.counts
 
     @property
     def drawn_enough(self) -> bool:
         """Whether as many starts were drawn as may be."""
         return self._starts.drawn >= self.most
 
-    def solve(
-        self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, start: np.ndarray | None = None
-    ) -> Solved:
-        """The best result of `starts` solves; see `scalarize` for reference, weights and ceiling (m,).
-
-        The first solve begins at `start` (n,), or at the best known vector for this problem.
-        """
-        first = start if start is not None else self.nearest(reference, weights)
-        found = [] if first is None else [self.from_vector(first, reference, weights, ceiling)]
+    def solve(self, task: Scalarised, start: np.ndarray | None = None) -> Solved:
+        """The best result of `starts` solves, the first from `start` (n,) or the best known vector for this problem."""
+        first = start if start is not None else self.nearest(task)
+        found = [] if first is None else [self.from_vector(first, task)]
         for _ in range((self.starts or 1) - len(found)):
-            found.append(self.from_drawn(reference, weights, ceiling))
-        return self.better(found, reference, weights)
+            found.append(self.from_drawn(task))
+        return self.better(found, task)
 
-    def seek(self, reference: np.ndarray, weights: np.ndarray, census: Census) -> Solved:
-        """The best result of as many solves as pay, see `Census`: further starts end when they have taken a little, or as much as the first
-        one took."""
-        before = self.counts.work
-        best = self.reached(self.solve(reference, weights), reference, weights)
-        limit = self.counts.work + max(LITTLE, self.counts.work - before)
-        census.add(self.loss(best, reference, weights))
+    def single(self, i: int) -> Solved:
+        """The optimum of objective i alone. Where a solve from the best that is known does not end, as that is an optimum of another
+        objective within tight limits, also from what was given."""
+        task = Scalarised.single(i, len(self.nlp.problem.goals))
+        if self.closest is not None:
+            return self.closest
+        if self.starts is None and i not in self.stopping:
+            self.stopping[i] = MultistartStopping(self._unseen)
+            solved = self.seek(task, self.stopping[i])
+        else:
+            solved = self.solve(task)
+        if (rival := self.rival(solved, task)) is not None:
+            solved = self.from_rival(rival, solved, task)
+        for start in self._known[: self._given] if solved.status != CONVERGED and not self.closest else ():
+            solved = self.better([solved, self.from_vector(start, task)], task)
+        return solved
+
+    def seek(self, task: Scalarised, stopping_rule: MultistartStopping) -> Solved:
+        """The best result of as many solves as pay: further starts end when they have taken a little, or as much as the first one took."""
+        before = self.solves.counts.work
+        best = self.with_feasible_start(self.solve(task), task)
+        limit = self.solves.counts.work + max(WORK.little, self.solves.counts.work - before)
+        stopping_rule.add(alpha_of(task, best))
         while not (
-            census.enough or self.closest or self.drawn_enough or self.counts.work >= limit or stopping() or self.is_least(best, reference)
+            stopping_rule.enough
+            or self.closest
+            or self.drawn_enough
+            or self.solves.counts.work >= limit
+            or stopping()
+            or self.is_least(best, task)
         ):
             # Where none has converged yet, they may all take long.
-            with self.solves.at_most(SHORT if census.converged else self.solves.max_iterations):
-                found = self.from_drawn(reference, weights, best=best if census.converged else None)
+            converged = stopping_rule.converged
+            with self.solves.at_most(MULTISTART.iterations if converged else self.solves.max_iterations):
+                found = self.from_drawn(task, best if converged else None)
             # One that is hardly better is the same optimum: that of the first start is as good.
-            if census.add(self.loss(found, reference, weights)) or (not census.converged and found.violation < best.violation):
+            if stopping_rule.add(alpha_of(task, found)) or (not stopping_rule.converged and found.violation < best.violation):
                 best = found
         return best
 
-    def reached(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> Solved:
+    def with_feasible_start(self, solved: Solved, task: Scalarised) -> Solved:
         """The result of a solve, or, where that is not feasible, of one from a vector that is.
 
         That vector is sought near the best that is known and near starts that are drawn. If there is none near any of them, the result is
@@ -151,135 +242,97 @@ class MultistartSolver:
         """
         if self.closest is not None:
             return self.closest
-        if solved.violation <= self.tolerance or len(self._F) > self._given:
+        if solved.violation <= self.solves.tolerance or len(self._F) > self._given:
             return solved
-        tried, limit, known = list[Solved](), self.counts.work + LITTLE, self.nearest(reference, weights)
-        while not stopping() and len(tried) < TRIED[1] and (len(tried) < TRIED[0] or self.counts.work < limit):
+        tried, limit, known = list[Solved](), self.solves.counts.work + WORK.little, self.nearest(task)
+        fewest, most = MULTISTART.infeasible
+        while not stopping() and len(tried) < most and (len(tried) < fewest or self.solves.counts.work < limit):
             start = self._starts.draw()[0] if known is None else known
             near, known = self.solves.least_violation(self.nlp, start), None
             if near.status == CONVERGED:
-                return self.better([solved, self.from_vector(near.z, reference, weights)], reference, weights)
+                return self.better([solved, self.from_vector(near.z, task)], task)
             tried.append(near)
-        if sum(near.status == INFEASIBLE for near in tried) >= TRIED[0]:
+        if sum(near.status == INFEASIBLE for near in tried) >= fewest:
             self.closest = min(tried, key=lambda near: near.violation)
         return self.closest or solved
 
-    def loss(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> float | None:
-        """What a scalarised problem minimises, at a result that converged."""
-        if solved.status != CONVERGED:
-            return None
-        moving = (reference < np.inf) & (weights > 0)
-        return float(np.max((solved.F - reference)[moving] / weights[moving]))
-
-    def from_vector(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
-        """The result of one solve from a vector (n,); if it converged, later solves may begin at it."""
-        solved = self.solves(self.nlp, start, reference, weights, ceiling)
+    def from_vector(self, start: np.ndarray, task: Scalarised, near: bool = False) -> Solved:
+        """The result of one solve from a vector (n,), or near it only; if it converged, later solves may begin at it."""
+        solved = self.solves(self.nlp, start, task, near)
         if solved.status == CONVERGED:
             self._known = np.vstack([self._known, solved.z])
             self._F, self._violation = np.vstack([self._F, solved.F]), np.append(self._violation, solved.violation)
         return solved
 
-    def single(self, i: int) -> Solved:
-        """The optimum of objective i alone. Where a solve from the best that is known does not end, as that is an optimum of another
-        objective within tight limits, also from what was given."""
-        task = single_task(i, len(self.nlp.problem.goals))
-        if self.closest is not None:
-            return self.closest
-        if self.starts is None and i not in self.census:
-            self.census[i] = Census(self.unseen)
-            solved = self.seek(*task, self.census[i])
-        else:
-            solved = self.solve(*task)
-        if (rival := self.rival(solved, *task)) is not None:
-            solved = self.from_rival(rival, solved, *task)
-        for start in self._known[: self._given] if solved.status != CONVERGED and not self.closest else ():
-            solved = self.better([solved, self.from_vector(start, *task)], *task)
-        return solved
-
-    def near(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None) -> Solved:
-        """The result of one solve that stays near a vector (n,)."""
-        with self.solves.nearby():
-            return self.from_vector(start, reference, weights, ceiling)
-
-    def merits(self, reference: np.ndarray, weights: np.ndarray, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
-        """Merits (k,) of points F (k, m) for a scalarised problem, less is better: their alpha plus their excess over limits and
-        constraints.
-
-        The excess over limits is in ranges of the objectives among the known points. With `strict`, as for results, a point with any excess
-        has an infinite merit; without, as for starts, it may still be good.
-        """
-        used, moving = reference < np.inf, (reference < np.inf) & (weights > 0)
-        alpha = np.max((F[:, moving] - reference[moving]) / weights[moving], axis=1, initial=-np.inf)
-        hard = used & ~moving
-        ranges = np.ptp(self._F[:, hard], axis=0) if len(self._F) else np.ones(hard.sum())
-        over = (np.maximum(F[:, hard] - reference[hard], 0.0) / np.where(ranges > 0, ranges, 1.0)).sum(axis=1)
-        missed = over + np.where(violation <= self.tolerance, 0.0, violation)
-        merit = alpha + np.where(missed > LIMIT, np.inf, 0.0) if strict else alpha + missed
-        return np.where(np.isfinite(merit), merit, np.inf)
-
-    def better(self, found: list[Solved], reference: np.ndarray, weights: np.ndarray) -> Solved:
-        """The best of several results of one problem: converged ones first, by their alpha; then the others by their violation."""
-        F, violation = np.array([solved.F for solved in found]), np.array([solved.violation for solved in found])
-        failed = np.array([solved.status != CONVERGED for solved in found])
-        merit = np.where(failed, violation, self.merits(reference, weights, F, violation))
-        return found[np.lexsort((merit, failed))[0]]
-
-    def rival(self, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
-        """A known vector (n,) that is clearly better for a problem than its own result; None if there is none."""
-        if not len(self._known):
-            return None
-        merits = self.merits(reference, weights, self._F, self._violation, strict=True)
-        own = self.merits(reference, weights, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
-        return self._known[np.argmin(merits)] if merits.min() < own - BETTER else None
-
-    def from_rival(self, rival: np.ndarray, solved: Solved, reference: np.ndarray, weights: np.ndarray) -> Solved:
-        """The better of a result and a solve from a known vector (n,) that is better; where that goes elsewhere, one that stays near it."""
-        found = self.better([solved, self.from_vector(rival, reference, weights)], reference, weights)
-        if self.rival(found, reference, weights) is not None:
-            found = self.better([found, self.near(rival, reference, weights)], reference, weights)
-        return found
-
-    def clearly_better(self, one: Solved, other: Solved, reference: np.ndarray, weights: np.ndarray) -> bool:
-        """Whether a result of a problem whose weights are ranges is better than another one by more than the accuracy of solves."""
-        alpha, known = self.loss(one, reference, weights), self.loss(other, reference, weights)
-        return alpha is not None and (known is None or alpha < known - BETTER)
-
-    def is_least(self, solved: Solved, reference: np.ndarray) -> bool:
-        """Whether a result converged and is the least that bounds allow, see `is_least` beside this class; reference (m,)."""
-        return solved.status == CONVERGED and is_least(self.nlp, solved.z, reference)
-
-    def nearest(self, reference: np.ndarray, weights: np.ndarray) -> np.ndarray | None:
-        """The known vector (n,) with the best merit; None if none is known."""
-        return self._known[np.argmin(self.merits(reference, weights, self._F, self._violation))] if len(self._known) else None
-
-    def from_drawn(
-        self, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None = None, best: Solved | None = None
-    ) -> Solved:
+    def from_drawn(self, task: Scalarised, best: Solved | None = None) -> Solved:
         """The result of a solve from a start that is drawn; `best` is the best result so far. Where there is none, and propagated states
         lead to no optimum, also from the states of the guess."""
         found: list[Solved] = []
         for start in self._starts.draw(None if best is None else best.z):
-            found.append(self.from_vector(start, reference, weights, ceiling))
+            found.append(self.from_vector(start, task))
             if found[-1].status == CONVERGED or best is not None:
                 break
-        return self.better(found, reference, weights)
+        return self.better(found, task)
+
+    def merits(self, task: Scalarised, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
+        """Merits (k,) of points F (k, m) for a problem, less is better: their alpha plus their excess over limits and constraints.
+
+        The excess over limits is in ranges of the objectives among the known points. With `strict`, as for results, a point with any excess
+        has an infinite merit; without, as for starts, it may still be good.
+        """
+        hard = task.hard
+        ranges = np.ptp(self._F[:, hard], axis=0) if len(self._F) else np.ones(hard.sum())
+        over = (np.maximum(F[:, hard] - task.reference[hard], 0.0) / np.where(ranges > 0, ranges, 1.0)).sum(axis=1)
+        excess = over + np.where(violation <= self.solves.tolerance, 0.0, violation)
+        merit = task.alpha(F) + (np.where(excess > MULTISTART.excess, np.inf, 0.0) if strict else excess)
+        return np.where(np.isfinite(merit), merit, np.inf)
+
+    def better(self, found: list[Solved], task: Scalarised) -> Solved:
+        """The best of several results of one problem: converged ones first, by their alpha; then the others by their violation."""
+        F, violation = np.array([solved.F for solved in found]), np.array([solved.violation for solved in found])
+        failed = np.array([solved.status != CONVERGED for solved in found])
+        merit = np.where(failed, violation, self.merits(task, F, violation))
+        return found[np.lexsort((merit, failed))[0]]
+
+    def nearest(self, task: Scalarised) -> np.ndarray | None:
+        """The known vector (n,) with the best merit; None if none is known."""
+        return self._known[np.argmin(self.merits(task, self._F, self._violation))] if len(self._known) else None
+
+    def rival(self, solved: Solved, task: Scalarised) -> np.ndarray | None:
+        """A known vector (n,) that is clearly better for a problem than its own result; None if there is none."""
+        if not len(self._known):
+            return None
+        merits = self.merits(task, self._F, self._violation, strict=True)
+        own = self.merits(task, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
+        return self._known[np.argmin(merits)] if merits.min() < own - MULTISTART.clearly else None
+
+    def from_rival(self, rival: np.ndarray, solved: Solved, task: Scalarised) -> Solved:
+        """The better of a result and a solve from a known vector (n,) that is better; where that goes elsewhere, one that stays near it."""
+        found = self.better([solved, self.from_vector(rival, task)], task)
+        if self.rival(found, task) is not None:
+            found = self.better([found, self.from_vector(rival, task, near=True)], task)
+        return found
+
+    def is_least(self, solved: Solved, task: Scalarised) -> bool:
+        """Whether a result converged and is the least that bounds allow, see `is_least` beside this class."""
+        return solved.status == CONVERGED and is_least(self.nlp, solved.z, task)
 
 
-def is_least(nlp: NLP, z: np.ndarray, reference: np.ndarray) -> bool:
+def alpha_of(task: Scalarised, solved: Solved) -> float | None:
+    """What a problem minimises, at a result that converged."""
+    return float(task.alpha(solved.F)) if solved.status == CONVERGED else None
+
+
+def is_least(nlp: NLP, z: np.ndarray, task: Scalarised) -> bool:
     """Whether a vector (n,) has the least value that the bounds of variables allow an objective to have: where it is linear, and the only
-    one of the problem with this reference (m,). No other start can then lead to less, by more than the accuracy of solves."""
-    (used,) = np.nonzero(reference < np.inf)
+    one of the problem. No other start can then lead to less, by more than the accuracy of solves."""
+    (used,) = np.nonzero(task.used)
     if len(used) != 1:
         return False
     slopes = np.array(objective_gradients(nlp)(z)).reshape(-1, len(z))[used[0]]
     room = np.where(nlp.period > 0, np.inf, np.where(slopes > 0, z - nlp.lower, nlp.upper - z))
     to_fall = float(np.abs(slopes[slopes != 0.0]) @ room[slopes != 0.0])
-    return to_fall <= BETTER * nlp_scales(nlp)[used[0]] and bool(linear_objectives(nlp)[used[0]])
-
-
-def single_task(i: int, m: int) -> tuple[np.ndarray, np.ndarray]:
-    """Reference and weights (m,) of objective i alone; see `scalarize`."""
-    return np.where(np.arange(m) == i, 0.0, np.inf), np.eye(m)[i]
+    return to_fall <= MULTISTART.clearly * nlp_scales(nlp)[used[0]] and bool(linear_objectives(nlp)[used[0]])
 
 
 def guessed_start(nlp: NLP) -> np.ndarray | None:

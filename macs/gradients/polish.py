@@ -1,41 +1,46 @@
-"""Gradient polish of an archive: its points are moved to the Pareto front by gradient solves, and spread along it."""
+"""Gradient polish of an archive: its points are moved to the Pareto front by gradient solves, and spread along it.
+
+Solves are made up to a number and kept in a log, so that a polish that was ended early can be continued.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from typing import ClassVar
+
 import numpy as np
 
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
 from ..pareto.archive import Archive
+from ..pareto.directions import across, divisions_below, simplex_lattice
 from ..pareto.dominance import CURVE, among, extremes
 from ..pareto.energy import Guide, reach, spread
 from ..pareto.ranges import BETTER, distinct, feasible_and_no_worse, nearest, ranges, slack
-from .counted import CountedSolves
-from .surface import cover
-
-FAIR, LOSS = 1e-4, 0.05
-"""Gain in its own objective, in its range, for which an end of the front may be replaced by a point that is far worse in another; what
-counts as far."""
 
 
-ROUNDS = 6
-"""Largest number of rounds with starts from neighbours, and of rounds in which points slide along the front."""
+@dataclass(frozen=True)
+class PolishLimits:
+    """How points are moved and spread; objectives are in ranges of the front."""
+
+    # An end may be replaced by a point that is worse in another objective by more than `loss` if it gains more than `fair` in its own.
+    fair: float = 1e-4
+    loss: float = 0.05
+    rounds: int = 6  # most rounds with starts from neighbours, and most rounds in which points slide along the front
+    wide: float = 1.5  # a gap so many times as wide as the median one gets a point of its own; crowded points are left out for it
+    nearer: float = 0.15  # where the middle of a gap was not reached, places are tried at this part of the way from both sides
+    gain: float = 0.995  # a slide is tried only if it is expected to lower the energy of the point at least to this fraction
+    places: int = 500  # most places that cover a surface
+    # With a guide, the places are around its first anchor instead, at these parts of the distances: its region may be small, it may lie
+    # beyond the simplex between the ends, and far from known points it is not known where it ends.
+    closer: tuple[float, float] = (1 / 3, 1 / 9)
 
 
-WIDE = 1.5
-"""A gap this many times as wide as the median one gets a point of its own; crowded points are left out for it."""
-
-
-NEARER = 0.15
-"""Where the middle of a gap was not reached, places are tried at this part of the way from both sides."""
-
-
-GAIN = 0.995
-"""A slide is tried only if it is expected to lower the energy of the point at least to this fraction."""
+POLISH = PolishLimits()
 
 
 def polish(
     archive: Archive,
-    solves: CountedSolves,
+    solves: BudgetedSolves,
     limit: int,
     exponent: float | None = None,
     guide: Guide | None = None,
@@ -67,14 +72,14 @@ def polish(
         if not solves.left:
             return archive
     archive, waiting = _descend(archive, solves, solved, exponent, guide)
-    for _ in range(0 if alike else ROUNDS):
+    for _ in range(0 if alike else POLISH.rounds):
         better = _helped_by_neighbours(archive, solves)
         if better is archive:
             break
         archive = better
     pool, span = archive, ranges(archive.F)
     archive = _thinned(pool, limit, exponent, guide)
-    for _ in range(ROUNDS):
+    for _ in range(POLISH.rounds):
         references, starts, gaps = _slide(archive, limit, exponent, guide)
         if not (len(references) and solves.left):
             break
@@ -83,7 +88,7 @@ def polish(
         failed = gaps[np.flatnonzero(found.status[: len(gaps)] != CONVERGED)]
         if len(failed) and solves.left:
             near, far = failed.ravel(), failed[:, ::-1].ravel()
-            nearer = archive.F[near] + NEARER * (archive.F[far] - archive.F[near])
+            nearer = archive.F[near] + POLISH.nearer * (archive.F[far] - archive.F[near])
             found = solves(archive.Z[near], nearer, np.tile(span, (len(near), 1)))
             pool = pool.joined(Archive.of(found, solves.feasible(found)))
         pool = _front(pool, span)
@@ -102,7 +107,7 @@ def _thinned(pool: Archive, limit: int, exponent: float | None, guide: Guide | N
 
 
 def _descend(
-    archive: Archive, solves: CountedSolves, solved: np.ndarray, exponent: float | None, guide: Guide | None
+    archive: Archive, solves: BudgetedSolves, solved: np.ndarray, exponent: float | None, guide: Guide | None
 ) -> tuple[Archive, Archive]:
     """The points after one guarded solve each, but for those with objectives (k, m) that were `solved` already, with the ends of the front;
     and the points that are left out for want of solves."""
@@ -131,7 +136,7 @@ def _settled(archive: Archive, optima: Archive) -> Archive:
     return _front(optima.take(np.unique(best[settled])).joined(archive.take(~settled)), span)
 
 
-def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves, solved: np.ndarray) -> Archive:
+def _ends(archive: Archive, span: np.ndarray, solves: BudgetedSolves, solved: np.ndarray) -> Archive:
     """One point for each objective: its least value, and for that the least values of the others; as they are where all were `solved`."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
@@ -141,7 +146,7 @@ def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves, solved: np.
     single = solves(best.Z, np.where(one, best.F, np.inf), np.where(one, span, 0.0))
     gain = (np.diag(best.F) - np.diag(single.F)) / span
     # Where many points have the least value of an objective, the one that is known may be far better in the others.
-    fair = (gain > FAIR) | ((single.F - best.F) / span <= LOSS).all(axis=1)
+    fair = (gain > POLISH.fair) | ((single.F - best.F) / span <= POLISH.loss).all(axis=1)
     kept = (single.status == CONVERGED) & (gain >= -slack(best.violation)) & fair
     ends = best.replaced(kept, single)
     if m == 1:
@@ -151,7 +156,7 @@ def _ends(archive: Archive, span: np.ndarray, solves: CountedSolves, solved: np.
     return ends.replaced(feasible_and_no_worse(both, ends.F, ends.violation, span), both)
 
 
-def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.ndarray | None = None) -> Archive:
+def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.ndarray | None = None) -> Archive:
     """The archive after guarded solves of all, or the chosen, points from their neighbours, but for those that were in vain before; the
     archive itself if none is better or solves are too few."""
     span, m = ranges(archive.F), archive.F.shape[1]
@@ -162,7 +167,7 @@ def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.nd
         worse = ((archive.F[None] - archive.F[:, None]) / span).max(axis=2)
         np.fill_diagonal(worse, np.inf)
         pairs = [(i, int(worse[i].argmin())) for i in sorted(rows, key=lambda i: worse[i].min())[: solves.left // 2]]
-    known = solves.in_vain if solves.in_vain is not None else np.empty((0, 2 * m))
+    known = solves.failed_pairs if solves.failed_pairs is not None else np.empty((0, 2 * m))
     pairs = [(i, j) for i, j in pairs if not among(np.hstack([archive.F[[i]], archive.F[[j]]]), known)[0]]
     if not 0 < len(pairs) <= solves.left:
         return archive
@@ -170,7 +175,7 @@ def _helped_by_neighbours(archive: Archive, solves: CountedSolves, chosen: np.nd
     found = solves(archive.Z[other], archive.F[own], np.tile(span, (len(own), 1)))
     gain = ((archive.F[own] - found.F) / span).min(axis=1)
     better = (found.status == CONVERGED) & (gain > BETTER)
-    solves.in_vain = np.vstack([known, np.hstack([archive.F[own], archive.F[other]])[~better]])
+    solves.failed_pairs = np.vstack([known, np.hstack([archive.F[own], archive.F[other]])[~better]])
     if not better.any():
         return archive
     return _front(Archive.of(found, better).joined(archive), span)
@@ -189,7 +194,7 @@ def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | 
     factors = None if guide is None else guide.factors(archive.F, archive.F)
     if factors is not None:
         apart *= [np.sqrt(factors[i] * factors[j]) for i, j in pairs]
-    wide = np.count_nonzero(apart > WIDE * np.median(apart))
+    wide = np.count_nonzero(apart > POLISH.wide * np.median(apart))
     gaps = [pairs[k] for k in np.argsort(-apart, kind="stable")[: max(wide, min(limit - n, n))]]
     references = [0.5 * (F[i] + F[j]) for i, j in gaps]
     starts = [archive.Z[i] for i, _ in gaps]
@@ -202,7 +207,7 @@ def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | 
             squared *= guide.factors(archive.F, lines * span)[:, None] * np.delete(factors, i)
         energy = (1.0 / np.maximum(squared, 1e-12) ** power).sum(axis=1)
         best = int(np.argmin(energy))
-        if energy[best] < GAIN * energy[0]:
+        if energy[best] < POLISH.gain * energy[0]:
             references.append(lines[best])
             starts.append(archive.Z[i])
     found = np.array(references).reshape(-1, F.shape[1]) * span, np.array(starts).reshape(-1, archive.Z.shape[1])
@@ -212,3 +217,167 @@ def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | 
 def _front(points: Archive, span: np.ndarray) -> Archive:
     """The points that are non-dominated and `distinct`."""
     return points.take(distinct(points.F, span))
+
+
+@dataclass(frozen=True)
+class SurfaceTask:
+    """Gradient solve to be made: the row of the point at which it starts, the reference (m,), and the place (m,) that it goes to."""
+
+    start: int
+    reference: np.ndarray
+    place: np.ndarray
+
+
+@dataclass
+class Surface:
+    """Points on a surface, and the places that solves went to. Distances are in the plane across the diagonal, in units of the front
+    between its ends."""
+
+    pool: Archive  # the points, the latest first
+    ideal: np.ndarray  # (m,): least values of the ends
+    between: np.ndarray  # (m,): their ranges
+    known: np.ndarray  # (k, m): Places and points in the plane; the ends first
+    solved: np.ndarray  # (k, m): Objectives of what solves converged to, and of the ends
+    lattice: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.lattice = simplex_lattice(len(self.ideal), divisions_below(len(self.ideal), POLISH.places)) @ self.known
+
+    def plane(self, F: np.ndarray) -> np.ndarray:
+        """The objectives (k, m) projected onto the plane."""
+        return across((F - self.ideal) / self.between)
+
+    def points(self) -> Archive:
+        """The points that are non-dominated and `distinct`."""
+        return self.pool.take(distinct(self.pool.F, self.between))
+
+    def even(self) -> SurfaceTask:
+        """To the place that is farthest from all known ones, from the point that is best for it."""
+        place = self.lattice[np.argmax(self._apart(self.lattice))]
+        reference = self.ideal + self.between * place
+        start = ((self.pool.F - reference) / self.between).max(axis=1).argmin()
+        return SurfaceTask(int(start), reference, place)
+
+    def guided(self, guide: Guide) -> SurfaceTask:
+        """To the place, around the point that the guide puts first, that is farthest from known ones, by the factors that are expected
+        there; from the nearest of the points where the guide wants most: what is good for the place alone may lie in a poor valley."""
+        first = int(guide.anchors(self.pool.F)[0])
+        shape = self.lattice - self.lattice.mean(axis=0)
+        places = np.vstack([self.plane(self.pool.F[first : first + 1]) + part * shape for part in POLISH.closer])
+        factors = guide.factors(self.pool.F, self.ideal + self.between * self._raised(places))
+        place = places[np.argmax(factors * self._apart(places))]
+        wanted = guide.factors(self.pool.F, self.pool.F)
+        good = np.flatnonzero(wanted == wanted.max())
+        start = good[np.linalg.norm(self.plane(self.pool.F[good]) - place, axis=1).argmin()]
+        return SurfaceTask(int(start), self.ideal + self.between * place, place)
+
+    def add(self, task: SurfaceTask, found: Evaluation, feasible: bool) -> None:
+        """Add the result of a solve."""
+        self.known = np.vstack([self.known, task.place])
+        if feasible:
+            self.known = np.vstack([self.known, self.plane(found.F)])
+            self.pool = Archive.of(found, np.arange(1)).joined(self.pool)
+        # What ran out of iterations is to go on.
+        self.solved = np.vstack([self.solved, found.F[found.status == CONVERGED]])
+
+    def _apart(self, places: np.ndarray) -> np.ndarray:
+        """Distances (k,) of places (k, m) from the nearest known ones."""
+        return np.linalg.norm(places[:, None] - self.known, axis=2).min(axis=1)
+
+    def _raised(self, places: np.ndarray) -> np.ndarray:
+        """Where the diagonals from places (k, m) are expected to meet the front: as far up as its point nearest to the diagonal."""
+        front = (self.pool.F - self.ideal) / self.between
+        beneath = np.linalg.norm(places[:, None] - across(front), axis=2).argmin(axis=1)
+        return places + front.mean(axis=1)[beneath, None]
+
+
+def cover(archive: Archive, ends: Archive, solves: BudgetedSolves, limit: int, guide: Guide | None) -> Surface:
+    """The points of an archive, with the ends of the front, and the results of solves to `limit` places between the ends.
+
+    With a guide, all solves that are left go to places that it wants.
+    """
+    span = ranges(archive.F)
+    pool = ends.joined(archive)
+    ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
+    between = np.where(between > 0.0, between, span)
+    known = across((ends.F - ideal) / between)
+    surface = Surface(pool.take(distinct(pool.F, span)), ideal, between, known, ends.F)
+    for k in range(max(limit, solves.left)):
+        # As long as it says nothing, the search is even.
+        guided = guide is not None and np.ptp(guide.factors(surface.pool.F, surface.pool.F)) > 0.0
+        if solves.left <= 0 or (k >= limit and not guided):
+            break
+        task = surface.guided(guide) if guide is not None and guided else surface.even()
+        found = solves(surface.pool.Z[task.start : task.start + 1], task.reference[None], between[None])
+        surface.add(task, found, bool(solves.feasible(found)[0]))
+    return surface
+
+
+@dataclass
+class PolishLog:
+    """Results of the first k solves of a polish, which can be continued with them."""
+
+    SHAPES: ClassVar[dict[str, str]] = {"Z": "k D", "F": "k m", "violation": "k", "status": "k str"}
+
+    archive: Archive  # the archive before the polish
+    Z: np.ndarray  # Z, F, violation, status: (k, D), (k, m), (k,), (k,): Results in the order of the solves; see `Evaluation`
+    F: np.ndarray
+    violation: np.ndarray
+    status: np.ndarray
+
+    @classmethod
+    def of(cls, archive: Archive) -> PolishLog:
+        """The log of a polish that begins with this archive."""
+        return cls(archive, archive.Z[:0], archive.F[:0], archive.violation[:0], np.empty(0, dtype="<U10"))
+
+    def __len__(self) -> int:
+        return len(self.F)
+
+    def add(self, found: Evaluation) -> None:
+        """Append the results of further solves."""
+        self.Z, self.F = np.vstack([self.Z, found.Z]), np.vstack([self.F, found.F])
+        self.violation, self.status = np.append(self.violation, found.violation), np.append(self.status, found.status)
+
+    def take(self, rows: slice) -> Evaluation:
+        """The results of the solves `rows`."""
+        return Evaluation(self.Z[rows], self.F[rows], self.violation[rows], self.status[rows])
+
+
+class BudgetedSolves:
+    """Gradient solves up to a number. After a request to end early no more are made.
+
+    `failed_pairs` (k, 2 m) has the objectives of points and of the neighbours from which nothing better was found for them.
+    """
+
+    def __init__(self, evaluator: Evaluator, left: int, log: PolishLog | None = None, failed_pairs: np.ndarray | None = None) -> None:
+        self._evaluator, self._log = evaluator, log
+        self._made = 0
+        self.left, self.stopped, self.failed_pairs = left, False, failed_pairs
+
+    def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
+        """The results of `Evaluator.descend`; rows beyond the number of solves have failed."""
+        Z, F = np.array(starts), np.full(references.shape, np.nan)
+        violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
+        for row in range(max(min(len(starts), self.left), 0)):
+            one = slice(row, row + 1)
+            found = self._solve(starts[one], references[one], weights[one])
+            if not len(found.F):
+                self.left, self.stopped = 0, True
+                break
+            self.left -= 1
+            Z[one], F[one], violation[one], status[one] = found.Z, found.F, found.violation, found.status
+        return Evaluation(Z, F, violation, status)
+
+    def feasible(self, found: Evaluation) -> np.ndarray:
+        """Mask (k,) of the feasible results: those that ran out of iterations may be, too."""
+        return (found.status == CONVERGED) | (found.violation <= self._evaluator.tolerance)
+
+    def _solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> Evaluation:
+        """The result of the next solve, one row, from the log or made now; no row if asked to end early."""
+        made, self._made = self._made, self._made + 1
+        if self._log is not None and made < len(self._log):
+            return self._log.take(slice(made, made + 1))
+        found = self._evaluator.descend(start, reference, weights)
+        if self._log is not None:
+            self._log.add(found)
+        return found

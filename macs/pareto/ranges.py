@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+
+from problems.compiled import Objective
 
 from ..evaluation.evaluator import CONVERGED, Evaluation
 from .dominance import nondominated
@@ -11,6 +15,8 @@ SAME = 1e-7
 """Objectives that differ by less than this part of their ranges are equal."""
 BETTER = 1e-6
 """An objective that is lower by this part of its range is clearly better."""
+CONSTANT = 1e-6
+"""An objective that varies less, as a fraction of its size, is judged by its size."""
 OPTIMISM = 10.0
 """A point that is feasible only within the tolerance may have objectives that are too low by so many times its violation."""
 
@@ -30,6 +36,19 @@ def ranges(F: np.ndarray) -> np.ndarray:
     """Range (m,) of each objective over points F (k, m); if that is zero, the size of the objective, at least 1."""
     span = np.ptp(F, axis=0)
     return np.where(span > 0.0, span, np.maximum(np.abs(F).max(axis=0), 1.0))
+
+
+def stated_scales(goals: Sequence[Objective]) -> np.ndarray:
+    """The scales (m,) that objectives state, 0 for none."""
+    return np.array([goal.scale or 0.0 for goal in goals])
+
+
+def objective_units(F: np.ndarray, stated: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """What counts as one in each objective (m,): the scale that was stated, 0 for none; else its range over points F (k, m), or its size if
+    it hardly varies, and at least `least` (m,); 1 where all that is 0."""
+    span, size = np.ptp(F, axis=0), np.abs(F).max(axis=0)
+    found = np.maximum(np.where(span > CONSTANT * size, span, size), least)
+    return np.where(stated > 0.0, stated, np.where(found > 0.0, found, 1.0))
 
 
 def nearest(point: np.ndarray, F: np.ndarray, ranges: np.ndarray) -> np.ndarray:

@@ -13,8 +13,7 @@ from ..fronts.builders import vectors_points
 from ..fronts.merging import best_rows
 from ..fronts.points import Points
 from ..fronts.verified import Simulations, objective_scales, verified
-from ..gradients.multistart import GradientSolves
-from ..gradients.tasks import Along
+from ..gradients.scalarised import GradientSolves, Scalarised
 from ..pareto.dominance import extremes
 from ..pareto.energy import Guide, spread
 from .mesh_loop import Programs
@@ -48,7 +47,7 @@ def filled(
         rows = np.flatnonzero(points.verified)
         near = rows[np.argsort(np.linalg.norm((points.simulated_F[rows] - target) / scales, axis=1), kind="stable")][:STARTS]
         for row in near:
-            found = _solved(points, int(row), Along(target, scales, scales), solves, programs, simulations)
+            found = _solved(points, int(row), Scalarised(target, scales, units=scales), solves, programs, simulations)
             if found is not None:
                 joined = Points.concatenate([points, found]).replace(stats=points.stats, solver=points.solver)
                 points = joined[best_rows(joined)]
@@ -90,7 +89,9 @@ def _target(points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide 
     return middles[new[0]] if new else None
 
 
-def _solved(points: Points, row: int, task: Along, solves: GradientSolves, programs: Programs, simulations: Simulations) -> Points | None:
+def _solved(
+    points: Points, row: int, task: Scalarised, solves: GradientSolves, programs: Programs, simulations: Simulations
+) -> Points | None:
     """A verified point of the task from a point, on its mesh; None if there is none."""
     point = points[row]
     method = from_dict(point.transcription or {})
@@ -101,5 +102,5 @@ def _solved(points: Points, row: int, task: Along, solves: GradientSolves, progr
     if solved.status != CONVERGED:
         return None
     found = vectors_points(nlp, solved.z[None], points.solver, points.stats)
-    found = verified(found, simulations.tolerance, task.units, remark=False, simulations=simulations)
+    found = verified(found, simulations.tolerance, task.weights, remark=False, simulations=simulations)
     return found if found.verified[0] else None

@@ -16,9 +16,8 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.builders import certified, vectors_points
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..gradients.multistart import GradientSolves
-from ..gradients.targets import moved_along
-from ..gradients.tasks import Along, End, Task
+from ..gradients.ends import moved_along
+from ..gradients.scalarised import GradientSolves, LexicographicEnd, Scalarised, Start, best_of
 from ..pareto.dominance import extremes
 from .mesh_loop import DRIFT, MeshLoop, Programs, differentiable
 
@@ -59,7 +58,7 @@ class _FineFront:
         F, ends = self.front.F, {}
         for objective, k in enumerate(extremes(F[self.rows])):
             if self.rows[k] not in ends:
-                ends[self.rows[k]] = End(objective, self.units, F[self.rows[k]])
+                ends[self.rows[k]] = LexicographicEnd.of(objective, self.units, F[self.rows[k]])
         for i, end in ends.items():
             self._solve(i, end, show)
         known = [i for i in ends if i in self.done]
@@ -70,7 +69,7 @@ class _FineFront:
         left = dict(zip(between, references, strict=True))
         while left and not stopping():
             i = min(left, key=lambda j: min((self._distance(j, k) for k in self.done), default=0.0))
-            self._solve(i, Along(left.pop(i), weights, self.units), show)
+            self._solve(i, Scalarised(left.pop(i), weights, units=self.units), show)
 
     def points(self) -> Points:
         """The front with the points that are done, and what they cost."""
@@ -81,19 +80,14 @@ class _FineFront:
         stats = more_costs(front.stats, self.solves.counts, 0.0, "")
         return Points.concatenate(rows).replace(solver=front.solver, stats=stats, message=front.message)
 
-    def _solve(self, i: int, task: Task, show: Callable[[str], None]) -> None:
+    def _solve(self, i: int, task: Scalarised, show: Callable[[str], None]) -> None:
         """Solve one point from its own trajectory and, if it is lost or gets worse, from its neighbours on this mesh."""
         show(f"points on a finer mesh: {len(self.done) + 1} of {len(self.rows)}")
         near = sorted(self.done, key=lambda j: self._distance(i, j))[:NEIGHBOURS]
-        bound, best = task.loss(self.front.F[i]) + DRIFT, None
-        for start in (self._start(i), *(self.done[j].z for j in near)):
-            with self.solves.at_most(PATIENCE):
-                solved = task.solve(self.solves, self.nlp, start)
-            if solved.status == CONVERGED and (best is None or task.loss(solved.F) < task.loss(best.F)):
-                best = solved
-            if stopping() or (best is not None and task.loss(best.F) <= bound):
-                break
-        if best is not None:
+        starts = (Start(z, drift=DRIFT) for z in (self._start(i), *(self.done[j].z for j in near)))
+        with self.solves.at_most(PATIENCE):
+            best = best_of(task, self.solves, self.nlp, starts, task.loss(self.front.F[i]))
+        if best.status == CONVERGED:
             self.done[i] = best
 
     def _start(self, i: int) -> np.ndarray:

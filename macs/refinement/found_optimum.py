@@ -15,9 +15,8 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
-from ..gradients.multistart import SHORT, MultistartSolver, is_least
-from ..gradients.starts import Census
-from ..gradients.tasks import Along
+from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, is_least
+from ..gradients.scalarised import WORK, Scalarised
 from .mesh_loop import MeshLoop, Refinement
 
 COARSE: tuple[Meshed, ...] = (
@@ -32,9 +31,8 @@ SECOND: Meshed = DFET(16, 3)
 """A mesh for other starts, beside that from which the optimum came: what one basis hides another may show."""
 SHARE, AGAIN = 0.5, 0.5
 """What other starts on each of the two may take together, and what refining what they find may take, as shares of the work before."""
-LITTLE, MUCH = 6e5, 2e6
-"""Work, see `MeshLoop`, that is a matter of a second or two, so that other starts may always take it; and that after which no other mesh is
-tried, if there is a result."""
+MUCH = 2e6
+"""Work after which no other mesh is tried, if there is a result."""
 PASSABLE = 5.0
 """How many times what is wanted a point may miss where other meshes are tried only as long as that takes little."""
 HOPELESS = 2
@@ -73,9 +71,9 @@ class Found:
         """Whether simulations agree with it as well as is wanted."""
         return self.refinement is not None and not self.refinement.complaints() and not self.behind
 
-    def is_least(self, reference: np.ndarray) -> bool:
+    def is_least(self, task: Scalarised) -> bool:
         """Whether bounds allow nothing better, see `multistart.is_least`."""
-        return self.status == CONVERGED and is_least(self.nlp, self.z, reference)
+        return self.status == CONVERGED and is_least(self.nlp, self.z, task)
 
     @property
     def note(self) -> str:
@@ -88,15 +86,14 @@ class Found:
 
 def found_optimum(
     loop: MeshLoop,
-    reference: np.ndarray,
-    weights: np.ndarray,
+    task: Scalarised,
     given: Callable[[NLP], np.ndarray | None],
     starts: int | None,
     rng: np.random.Generator,
     coarse: Sequence[Meshed] = COARSE,
 ) -> Found:
-    """The optimum of a scalarised problem, from coarse meshes on. reference, weights (m,)."""
-    search = _Search(loop, reference, weights)
+    """The optimum of a scalarised problem, from coarse meshes on."""
+    search = _Search(loop, task)
     for method in coarse:
         try:
             nlp = loop.programs(method)
@@ -110,7 +107,7 @@ def found_optimum(
         if search.enough:
             break
     best = search.best
-    if starts is None and not (best.good and (best.times == best.starts > 1 or best.is_least(reference))):
+    if starts is None and not (best.good and (best.times == best.starts > 1 or best.is_least(task))):
         search.elsewhere((SECOND,))
     return search.best
 
@@ -125,13 +122,13 @@ class _Attempt:
     solved: Solved
     alpha: float
     found: Found
-    census: Census
+    census: MultistartStopping
     unit: float = 1.0
     loss: float = np.inf
     achieved: float = np.inf
 
 
-_Other = tuple[float, Meshed, MultistartSolver, Solved, Census]
+_Other = tuple[float, Meshed, MultistartSolver, Solved, MultistartStopping]
 """Another optimum on a coarse mesh: by how much it is better there than the best attempt, in its units, negative; the mesh, its solver, the
 result, and what the starts there have found."""
 
@@ -139,63 +136,62 @@ result, and what the starts there have found."""
 class _Search:
     """Attempts from coarse meshes, and which of them is best."""
 
-    def __init__(self, loop: MeshLoop, reference: np.ndarray, weights: np.ndarray) -> None:
-        self.loop, self.reference, self.weights = loop, reference, weights
-        self._task = Along(reference, weights, np.ones(len(weights)))
+    def __init__(self, loop: MeshLoop, task: Scalarised) -> None:
+        self.loop, self.task = loop, task
         self.all: list[_Attempt] = []
-        self._units = np.full(len(weights), np.inf)
+        self._units = np.full(len(task.weights), np.inf)
         self.exhausted, self.hopeless = False, 0
         self._searched: set[Meshed] = set()
 
     def begin(self, method: Meshed, solver: MultistartSolver, elsewhere: bool) -> None:
         """Solve on a coarse mesh, also `elsewhere` if other starts were not made yet, and refine what is best; where that leads to no good
         point, also what the first start gave: an optimum that is better on a coarse mesh may be none."""
-        solved = solver.solve(self.reference, self.weights)
-        solved = best = solver.reached(solved, self.reference, self.weights) if elsewhere else solved
+        solved = solver.solve(self.task)
+        solved = best = solver.with_feasible_start(solved, self.task) if elsewhere else solved
         self.hopeless += solver.closest is not None
-        census = Census()
+        census = MultistartStopping()
         census.add(self._loss(solved))
-        if elsewhere and not self._searched and solved.status == CONVERGED and not solver.is_least(solved, self.reference):
+        if elsewhere and not self._searched and solved.status == CONVERGED and not solver.is_least(solved, self.task):
             self._searched.add(method)
-            others = self._drawn(solver, solved, census, self.loop.work + LITTLE)
-            best = min([solved, *others], key=lambda one: self._task.loss(one.F))
+            others = self._drawn(solver, solved, census, self.loop.work + WORK.little)
+            best = min([solved, *others], key=lambda one: self.task.loss(one.F))
         self.add(method, solver, best, census)
         if best is not solved and not self.best.good and not self.loop.ended:
             self.add(method, solver, solved, census)
 
     def _loss(self, solved: Solved) -> float | None:
-        return self._task.loss(solved.F) if solved.status == CONVERGED else None
+        return self.task.loss(solved.F) if solved.status == CONVERGED else None
 
-    def _drawn(self, solver: MultistartSolver, known: Solved, census: Census, most: float) -> list[Solved]:
+    def _drawn(self, solver: MultistartSolver, known: Solved, census: MultistartStopping, most: float) -> list[Solved]:
         """Optima that starts that are drawn lead to on a coarse mesh, of which one is known, until there are enough, or `most` work is
         done."""
         found: list[Solved] = []
         nearby = known if known.status == CONVERGED else None
-        with suppress(Stopped), self.loop.solves.at_most(SHORT):
+        with suppress(Stopped), self.loop.solves.at_most(MULTISTART.iterations):
             while not (census.enough or self.loop.ended or self.loop.work >= most):
-                solved = solver.from_drawn(self.reference, self.weights, best=nearby)
+                solved = solver.from_drawn(self.task, nearby)
                 loss = self._loss(solved)
                 nearby = solved if census.add(loss) else nearby
                 found += [solved] if loss is not None else []
         return found
 
-    def add(self, method: Meshed, solver: MultistartSolver, solved: Solved, census: Census) -> None:
+    def add(self, method: Meshed, solver: MultistartSolver, solved: Solved, census: MultistartStopping) -> None:
         """Refine the result of a solve on a coarse mesh, of whose starts there is a census, if it converged."""
         loop, nlp = self.loop, solver.nlp
-        attempt = _Attempt(method, solver, solved, self._task.loss(solved.F), Found(nlp, solved, None), census)
+        attempt = _Attempt(method, solver, solved, self.task.loss(solved.F), Found(nlp, solved, None), census)
         if solved.status == CONVERGED:
             # Objectives that are large only where an attempt is poor are not to be judged by that.
             self._units = units = np.minimum(self._units, loop.units(solved.F[None], nlp, solved.z))
             with suppress(Stopped):
                 begun = loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True)
-                refinement = loop.refine(begun, Along(self.reference, self.weights, units))
+                refinement = loop.refine(begun, replace(self.task, units=units))
                 attempt = self._refined(attempt, refinement, units)
         self.all.append(attempt)
 
     def _refined(self, attempt: _Attempt, refinement: Refinement, units: np.ndarray) -> _Attempt:
-        best, task = refinement.best, self._task
-        moving = task.used & (self.weights > 0)
-        unit = 1.0 / float(np.max((self.weights / units)[moving])) * float(np.max(self.weights[moving]))
+        best, task = refinement.best, self.task
+        moving = task.moving
+        unit = 1.0 / float(np.max((task.weights / units)[moving])) * float(np.max(task.weights[moving]))
         loss = task.loss(best.F)
         known = [] if best.achieved is None else [task.loss(best.achieved) + best.verdict.doubt * unit]
         known += [loss - refinement.worse * unit] if refinement.worse else []
@@ -209,7 +205,7 @@ class _Search:
         refined = best.refinement is not None
         if not refined and self.hopeless >= HOPELESS:
             return True
-        return best.good or self.loop.ended or (refined and (work >= MUCH or (work >= LITTLE and self._passable(best))))
+        return best.good or self.loop.ended or (refined and (work >= MUCH or (work >= WORK.little and self._passable(best))))
 
     def _passable(self, best: Found) -> bool:
         """Whether an optimum is known to be nearly as good as is wanted, in the spans of bounds: what states do may be little of these."""
@@ -236,7 +232,7 @@ class _Search:
             exhausted=self.exhausted,
             starts=census.converged,
             optima=census.optima(same),
-            times=census.times(self.all[i].alpha, same),
+            times=census.hits(self.all[i].alpha, same),
         )
 
     def elsewhere(self, coarse: Sequence[Meshed]) -> None:
@@ -248,8 +244,8 @@ class _Search:
         for method in dict.fromkeys((first.method, *coarse)):
             if method not in self._searched:
                 with suppress(Stopped):
-                    others += self._others(method, first, best, before + max(SHARE * min(before, MUCH), LITTLE))
-        usual, most = loop.most_work, loop.work + max(AGAIN * min(before, MUCH), LITTLE)
+                    others += self._others(method, first, best, before + max(SHARE * min(before, MUCH), WORK.little))
+        usual, most = loop.most_work, loop.work + max(AGAIN * min(before, MUCH), WORK.little)
         loop.most_work = most if usual is None else min(most, usual)
         for _, method, solver, solved, census in sorted(others, key=lambda other: other[0])[:REFINED]:
             if not loop.ended:
@@ -264,15 +260,15 @@ class _Search:
         if method == first.method:
             solver, known, census = first.solver, first.solved, first.census
         else:
-            nlp, census = loop.programs(method), Census()
+            nlp, census = loop.programs(method), MultistartStopping()
             solver = MultistartSolver(nlp, None, 1, first.solver.rng, loop.solves)
-            with loop.solves.at_most(SHORT):
-                known = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), self.reference, self.weights)
+            with loop.solves.at_most(MULTISTART.iterations):
+                known = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), self.task)
             census.add(self._loss(known))
-        alpha = self._task.loss(known.F) if known.status == CONVERGED else np.inf
+        alpha = self.task.loss(known.F) if known.status == CONVERGED else np.inf
         seen, found = [alpha], list[_Other]()
         for solved in self._drawn(solver, known, census, most):
-            loss = self._task.loss(solved.F)
+            loss = self.task.loss(solved.F)
             if all(abs(loss - other) > CLEARLY * unit for other in seen):
                 seen.append(loss)
                 if loss < alpha or not best.good:

@@ -19,12 +19,12 @@ from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, verified
 from ..gradients.front_polish import KEPT_INSIDE, back_off
-from ..gradients.multistart import GradientSolves
+from ..gradients.scalarised import WORK, GradientSolves
 from ..io.console import working
 from ..pareto.energy import Guide
 from .filling import filled
 from .fine_front import solved_on
-from .mesh_loop import BUILDING, OnMesh, Programs
+from .mesh_loop import OnMesh, Programs
 from .mesh_refinement import FrontRefinement
 
 PART = 0.8
@@ -182,7 +182,7 @@ class _Mending:
         searched: then the mesh is all that there is to be found."""
         if not points.stats["evaluations"]:
             return None
-        spent = points.stats.get("work", 0) - self._work + BUILDING * self.programs.built
+        spent = points.stats.get("work", 0) - self._work + WORK.building * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places]))
         return max(SHARE * self._work - spent, LEAST * count * size, LITTLE)
 

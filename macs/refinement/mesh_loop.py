@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,13 +22,11 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
-from ..gradients.multistart import GradientSolves
-from ..gradients.tasks import Task
+from ..gradients.scalarised import WORK, GradientSolves, Scalarised, Start, best_of
+from ..pareto.ranges import objective_units, stated_scales
 
 KEPT = 3
 """Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""
-BUILDING = 30
-"""Iterations of IPOPT that take as long as it takes to make a program with its derivatives: measured 18 to 53."""
 LITTLE = 1e-4
 """Part of what an objective varies by near a trajectory that counts as one unit of it at least."""
 PATIENCE = 3
@@ -173,15 +170,13 @@ class MeshLoop:
     @property
     def work(self) -> float:
         """Work so far, in iterations times variables."""
-        return self.solves.counts.work + BUILDING * (self.programs.built - self._built)
+        return self.solves.counts.work + WORK.building * (self.programs.built - self._built)
 
     @staticmethod
     def units(F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
-        """What counts as one in each objective (m,): its range over F (k, m), or its size if that is zero, and at least a little of what it
-        varies by near a vector of the NLP: an objective near zero is not judged by its own size."""
-        ranges = np.ptp(F, axis=0)
-        found = np.maximum(np.where(ranges > 0, ranges, np.abs(F).max(axis=0)), LITTLE * objective_variations(nlp, z))
-        return np.where(found > 0, found, 1.0)
+        """What counts as one in each objective (m,), see `objective_units`: at least a little of what it varies by near a vector of the
+        NLP, since an objective near zero is not judged by its own size."""
+        return objective_units(F, stated_scales(nlp.problem.goals), LITTLE * objective_variations(nlp, z))
 
     def on_mesh(
         self,
@@ -201,7 +196,7 @@ class MeshLoop:
         )
         return OnMesh(method, z, F, trajectory, verdict, by_gradients, achieved if feasible and np.isfinite(achieved).all() else None)
 
-    def refine(self, begun: OnMesh, task: Task, others: Sequence[Trajectory] = (), hints: Sequence[Meshed] = ()) -> Refinement:
+    def refine(self, begun: OnMesh, task: Scalarised, others: Sequence[Trajectory] = (), hints: Sequence[Meshed] = ()) -> Refinement:
         """A point on meshes that simulations agree with, as far as the limits allow."""
         found = Refinement(begun)
         present, history, waiting, detours = begun, [begun.verdict.error], list(hints), DETOURS
@@ -242,13 +237,13 @@ class MeshLoop:
         found.worse = beyond if beyond > self.wanted.settled else 0.0
         return found
 
-    def _rank(self, one: OnMesh, task: Task, least: float) -> tuple[bool, float]:
+    def _rank(self, one: OnMesh, task: Scalarised, least: float) -> tuple[bool, float]:
         """Whether something is wrong with a point, and its largest error, in units of what it may be; what it is worse than what was
         achieved counts like an error of its objectives."""
         beyond = (task.loss(one.F) - least) / self.wanted.settled if self.wanted.confirmed else 0.0
         return bool(one.complaints()) or beyond > 1.0, max(one.error, beyond)
 
-    def _improves(self, reached: OnMesh, present: OnMesh, task: Task, least: float) -> bool:
+    def _improves(self, reached: OnMesh, present: OnMesh, task: Scalarised, least: float) -> bool:
         """Whether a mesh with knots, or another point's, is one to go on with: its errors are not larger, and its optimum is no worse than
         what was achieved."""
         errors = reached.verdict.error <= max(1.0, present.verdict.error)
@@ -278,7 +273,7 @@ class MeshLoop:
             yield from map(Proposal, finer.alternatives())
 
     def _solved(
-        self, proposal: Proposal, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float
+        self, proposal: Proposal, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float
     ) -> tuple[OnMesh | None, str]:
         """The point on another mesh, None if no solve converged; and its status."""
         method = proposal.method
@@ -295,7 +290,7 @@ class MeshLoop:
         return replace(reached, change=change, tried=tried), solved.status
 
     def _from_starts(
-        self, nlp: NLP, present: OnMesh, task: Task, others: Sequence[Trajectory], least: float, near_first: bool
+        self, nlp: NLP, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float, near_first: bool
     ) -> tuple[Solved, bool]:
         """The best result of solves from the present trajectory and, if that fails or gets worse, near it, or the other way round, and
         from others; and whether it is an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point
@@ -303,19 +298,11 @@ class MeshLoop:
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
-        best = None
         slip = min(SLIP * self.wanted.settled, DRIFT)
         own = [(present.trajectory, near_first, slip), (present.trajectory, not near_first, DRIFT)]
         attempts = [*own, *((other, False, DRIFT) for other in others)]
-        for trajectory, near, drift in attempts:
-            with self.solves.nearby() if near else nullcontext():
-                solved = task.solve(self.solves, nlp, nlp.interpolate(trajectory))
-            if best is None or (solved.status != CONVERGED, task.loss(solved.F)) < (best.status != CONVERGED, task.loss(best.F)):
-                best = solved
-            if stopping() or (best.status == CONVERGED and task.loss(best.F) <= bound + drift):
-                break
-        assert best is not None
-        return best, True
+        starts = (Start(nlp.interpolate(trajectory), near, drift) for trajectory, near, drift in attempts)
+        return best_of(task, self.solves, nlp, starts, bound), True
 
     def _projected(self, nlp: NLP, start: np.ndarray) -> tuple[Solved, bool]:
         """The feasible point nearest to a vector, and that it is no optimum."""
@@ -335,12 +322,12 @@ def differentiable(problem: CompiledProblem) -> bool:
     return True
 
 
-def _achieved(point: OnMesh, task: Task) -> float:
+def _achieved(point: OnMesh, task: Scalarised) -> float:
     """The loss that the simulation of a point has for certain."""
     return np.inf if point.achieved is None else task.loss(point.achieved) + point.verdict.doubt
 
 
-def _change(before: OnMesh, F: np.ndarray, task: Task, settled: float) -> float:
+def _change(before: OnMesh, F: np.ndarray, task: Scalarised, settled: float) -> float:
     """The largest change of the objectives that matter, in units, from those on the mesh before, or from those that its simulation
     achieved, whichever is less: what a coarse mesh has wrong is no change of the point. Of objectives that are not `sharp`, a change of
     `BLUNT` counts as one of `settled`."""

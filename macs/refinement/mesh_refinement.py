@@ -21,9 +21,8 @@ from ..fronts.builders import certified, vectors_points
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..gradients.multistart import MOST_ITERATIONS, GradientSolves
-from ..gradients.targets import moved_along
-from ..gradients.tasks import Along, End, Task
+from ..gradients.ends import moved_along
+from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised
 from ..io.console import working
 from ..pareto.dominance import extremes
 from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
@@ -120,7 +119,7 @@ class FrontRefinement:
             i = min(between, key=lambda j: min((self._distance(j, k) for k in self.found), default=0.0))
             between.remove(i)
             show(f"meshes of the front: point {len(self.found) + 1} of {len(self.chosen)}")
-            self._refine(i, Along(references[i], weights, self.units))
+            self._refine(i, Scalarised(references[i], weights, units=self.units))
 
     def points(self, elapsed: float, stopped: str) -> Points:
         """The front with the refined points, in the same order, and what they cost."""
@@ -143,9 +142,9 @@ class FrontRefinement:
             )
         return method
 
-    def _ends(self) -> dict[int, End]:
+    def _ends(self) -> dict[int, LexicographicEnd]:
         """The points that are ends of the whole front, not only of the part that is here: found out on their own meshes."""
-        ends: dict[int, End] = {}
+        ends: dict[int, LexicographicEnd] = {}
         if not differentiable(self.loop.problem):
             return ends
         for objective, row in enumerate(extremes(self.front.F[self.good])):
@@ -153,7 +152,7 @@ class FrontRefinement:
             if i not in self.methods or i in ends or stopping():
                 continue
             if len(self.units) == 1 or self._is_end(i, np.arange(len(self.units)) == objective):
-                ends[i] = End(objective, self.units, self.front.F[i])
+                ends[i] = LexicographicEnd.of(objective, self.units, self.front.F[i])
         return ends
 
     def _is_end(self, i: int, mine: np.ndarray) -> bool:
@@ -162,7 +161,7 @@ class FrontRefinement:
         known = self._known(i)
         if known and optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= STATIONARY:
             return True
-        solved = self.solves(nlp, point.decision, np.where(mine, 0.0, np.inf), self.units)
+        solved = self.solves(nlp, point.decision, Scalarised(np.where(mine, 0.0, np.inf), self.units))
         if solved.status != CONVERGED:
             return not known
         others = np.array([self._distance(i, j) for j in self.good.tolist() if j != i])
@@ -184,12 +183,12 @@ class FrontRefinement:
     def _distance(self, i: int, j: int) -> float:
         return float(np.linalg.norm((self.front.F[i] - self.front.F[j]) / self.units))
 
-    def _refine(self, i: int, task: Task) -> None:
+    def _refine(self, i: int, task: Scalarised) -> None:
         """Refine one point, and make its row of the new front."""
         point = self.front[i]
         known = self._known(i)
         trajectory = self._trajectory(i)
-        begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, task.units, known)
+        begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, self.units, known)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[:NEIGHBOURS]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
         near_meshes = self._meshes_near(done, begun.verdict.error, task)
@@ -198,13 +197,13 @@ class FrontRefinement:
         hints = list(dict.fromkeys([*near_meshes, *own]))
         if self._most_work is not None:
             # One point that resists is not to take what is meant for the others.
-            share = (OF_END if isinstance(task, End) else OF_ONE) * self._most_work / len(self.chosen)
+            share = (OF_END if isinstance(task, LexicographicEnd) else OF_ONE) * self._most_work / len(self.chosen)
             self.loop.most_work = min(self._most_work, self.loop.work + share)
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
         self.loop.most_work = self._most_work
         self._rows[i] = self._row(i, found.best, found.note)
 
-    def _meshes_near(self, done: Sequence[int], error: float, task: Task) -> list[Meshed]:
+    def _meshes_near(self, done: Sequence[int], error: float, task: Scalarised) -> list[Meshed]:
         """Meshes that are tried first for a point with an error, in units of what it may be: those of the nearest that is `done`."""
         if not done:
             return []
@@ -212,7 +211,7 @@ class FrontRefinement:
         if error > HINTED:
             return nearest.meshes[-2:]
         # Where no other mesh has to confirm it, its program is there already. An end is far from others.
-        return [] if self.wanted.confirmed or isinstance(task, End) else [nearest.best.method]
+        return [] if self.wanted.confirmed or isinstance(task, LexicographicEnd) else [nearest.best.method]
 
     def _trajectory(self, i: int) -> Trajectory:
         found = self.found.get(i)

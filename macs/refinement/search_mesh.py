@@ -20,9 +20,9 @@ from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import certified, vectors_points
 from ..fronts.points import Points
 from ..fronts.verified import verified
-from ..gradients.lexicographic import lexicographic_ends
-from ..gradients.multistart import GradientSolves, MultistartSolver, guessed_start
-from ..gradients.starts import Census
+from ..gradients.ends import lexicographic_ends
+from ..gradients.multistart import MultistartSolver, MultistartStopping, guessed_start
+from ..gradients.scalarised import GradientSolves
 from .mesh_loop import differentiable
 from .mesh_refinement import FrontRefinement
 
@@ -53,7 +53,9 @@ class Chosen:
     counts: Counts  # what it cost to find out
     ends: Points | None = None  # the optima of single objectives on the coarse mesh, from which that was found out
     refined: Points | None = None  # the same on meshes of their own
-    census: Mapping[int, Census] = field(default_factory=dict)  # what the starts for each single objective have found on the coarse mesh
+    stopping: Mapping[int, MultistartStopping] = field(
+        default_factory=dict
+    )  # what the starts for each single objective have found on the coarse mesh
 
 
 def search_transcription(
@@ -88,13 +90,13 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go(show)
-    counts = solver.counts.joined(job.solves.counts)
+    counts = solves.counts.joined(job.solves.counts)
     found = [one.best.method for one in job.found.values()]
     fine = _common(found, problem) if found and not _enough(ends, own, job, limits) else COARSE
     if not len(ends):
         return Chosen(COARSE, None, counts)
     refined = job.points(0.0, "").replace(notes=[""] * len(ends))
-    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends, refined, solver.census)
+    return Chosen(COARSE, None if fine == COARSE else fine, counts, ends, refined, solver.stopping)
 
 
 def _enough(ends: Points, own: Sequence[int], job: FrontRefinement, limits: float) -> bool:

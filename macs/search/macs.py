@@ -21,9 +21,8 @@ from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..evaluation.linear_models import Samples
 from ..front import Front
 from ..fronts.merging import best_rows
-from ..gradients.counted import CountedSolves, PolishLog
 from ..gradients.front_polish import polished
-from ..gradients.polish import polish
+from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..pareto import directions
 from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
@@ -217,12 +216,12 @@ class MACS(Settings, Solver):
         count = max(state.evaluations // self.polish_every - state.refinements, FEWEST if evaluator.ways else 0)
         if state.rounds is not None:
             count = SOLVES * self.archive
-        solves = CountedSolves(evaluator, count, polishing, state.in_vain)
+        solves = BudgetedSolves(evaluator, count, polishing, state.in_vain)
         # A later round is polished if it found something new: not all starts are alike.
         guide, alike = guide_of(self.prefer, evaluator), bool(state.alike.all()) and state.polished is None
         state.archive = polish(polishing.archive, solves, self.archive, self.exponent, guide, state.optima, alike)
         if not solves.stopped:
-            state.polishing, state.polished, state.in_vain = None, state.archive, solves.in_vain
+            state.polishing, state.polished, state.in_vain = None, state.archive, solves.failed_pairs
             solved = polishing.take(slice(None))
             state.learn(Archive.of(solved, solved.status == CONVERGED))
             found = np.vstack([polishing.archive.F, solved.F[solves.feasible(solved)], state.archive.F])

@@ -13,12 +13,9 @@ from transcription.stopping import stopping
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
-from ..gradients import starts
-from ..gradients.along import along
-from ..gradients.lexicographic import lexicographic_ends
-from ..gradients.multistart import SHORT, GradientSolves, MultistartSolver, guessed_start, single_task
-from ..gradients.starts import Starts
-from ..gradients.targets import METHODS, targets
+from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_between
+from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, alpha_of, guessed_start
+from ..gradients.scalarised import GradientSolves, Scalarised
 from ..pareto.archive import Archive
 from ..pareto.dominance import extremes
 from ..pareto.ranges import ranges
@@ -85,34 +82,33 @@ class Opening:
         if start is None:
             return None
         count = None if self._evaluator.ways else 1
-        solver = MultistartSolver(self._evaluator.nlp, start, count, self._rng, _counted_by(self._evaluator))
-        solver.unseen, solver.most = UNSEEN, self._budget // EVERY
-        return solver
+        solves, most = _counted_by(self._evaluator), self._budget // EVERY
+        return MultistartSolver(self._evaluator.nlp, start, count, self._rng, solves, UNSEEN, most)
 
     def _decided(self, solver: MultistartSolver | None) -> bool:
         """Whether a gradient solve for the first objective ends at an optimum, or solves for feasibility find that there is none."""
         if solver is None:
             return False
-        task = single_task(0, len(self._evaluator.goals))
-        with solver.solves.at_most(SHORT):
-            solved = solver.solve(*task)
-        return solver.reached(solved, *task).status == CONVERGED or solver.closest is not None
+        task = Scalarised.single(0, len(self._evaluator.goals))
+        with solver.solves.at_most(MULTISTART.iterations):
+            solved = solver.solve(task)
+        return solver.with_feasible_start(solved, task).status == CONVERGED or solver.closest is not None
 
     def _found(self, solver: MultistartSolver) -> Evaluation:
         """The ends of the front, and a compromise of them; where the search chooses its ways, points along the front instead, each from as
         many starts as pay. Fewer if asked to end early, or where none was found."""
         found = lexicographic_ends(solver)
-        self.several = any(one.optima() > 1 for one in solver.census.values())
-        for i, one in solver.census.items():
+        self.several = any(one.optima() > 1 for one in solver.stopping.values())
+        for i, one in solver.stopping.items():
             self.alike[i] = one.enough and one.optima() == 1
         if self.alike.all():
             solver.most = 0  # nothing else is expected between the ends, either
         if 1 < len(found) == sum(one.status == CONVERGED for one in found):
             F = np.array([one.F for one in found])
             if self._evaluator.ways:
-                found += along(solver, targets(F, ranges(F), max(self._points, len(F) + 1), METHODS[0]))
+                found += solve_tasks(solver, tasks_between(F, ranges(F), max(self._points, len(F) + 1), METHODS[0]))
             else:
-                found.append(solver.solve(F.min(axis=0), ranges(F)))
+                found.append(solver.solve(Scalarised(F.min(axis=0), ranges(F))))
         assert isinstance(self._evaluator, Bilevel)
         return _feasible_of(found, self._evaluator)
 
@@ -125,22 +121,21 @@ def anew(
     solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, _counted_by(evaluator))
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = archive.F[extremes(archive.F)]
-    singles = [single_task(i, m) for i in range(m) if alike.all() or not alike[i]]
-    between = targets(ends, np.ptp(ends, axis=0), max(min(points, FIRST), m + 1), METHODS[0]) if m > 1 else []
+    singles = [Scalarised.single(i, m) for i in range(m) if alike.all() or not alike[i]]
+    between = tasks_between(ends, np.ptp(ends, axis=0), max(min(points, FIRST), m + 1), METHODS[0]) if m > 1 else []
     found, worse = [], False
-    with solver.solves.at_most(SHORT):
+    with solver.solves.at_most(MULTISTART.iterations):
         for k in range(drawn, drawn + count):
             if stopping():
                 break
             # Ends are what points between them follow: two starts for these, and one for one of those, in turn.
             inner = bool(between) and k % 3 == 2
             turn, which = divmod(k // 3, len(between)) if inner else divmod(k - k // 3 if between else k, len(singles))
-            reference, weights = (between if inner else singles)[which]
-            start = Starts(evaluator.nlp, rng, starts.FIRST + turn + which).draw(solver.nearest(reference, weights))[0]
-            found.append(solver.from_vector(start, reference, weights))
-            loss = solver.loss(found[-1], reference, weights)
-            known = solver.merits(reference, weights, archive.F, archive.violation).min()
-            worse |= loss is not None and bool(loss > known + OTHER * (span / np.where(weights > 0, weights, np.inf)).max())
+            task = (between if inner else singles)[which]
+            start = Starts(evaluator.nlp, rng, MULTISTART.everywhere + turn + which).draw(solver.nearest(task))[0]
+            found.append(solver.from_vector(start, task))
+            alpha, known = alpha_of(task, found[-1]), solver.merits(task, archive.F, archive.violation).min()
+            worse |= alpha is not None and bool(alpha > known + OTHER * (span / np.where(task.moving, task.weights, np.inf)).max())
     return _feasible_of(found, evaluator), worse
 
 

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..gradients.multistart import LITTLE
+from ..gradients.scalarised import WORK
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import nondominated
 from ..pareto.ranges import distinct, ranges
@@ -26,7 +26,7 @@ STARTS = 6
 """A later round begins with one gradient solve from another start for so many of its evaluations."""
 PATIENCE, AGAIN, LONG = 2, 0.25, 8
 """Where optima are several: evaluations without progress before the search ends, in least rounds, and as a part of what the last progress
-took; and the least rounds that are enough where they took less work than other starts may always take, `LITTLE`."""
+took; and the least rounds that are enough where they took less work than other starts may always take, `WORK.little`."""
 GROWTH = 4
 """A later round has at least this part, one fourth, of all evaluations before it."""
 SOLVES = 8
@@ -106,7 +106,7 @@ class Rounds:
 def least(gradients: bool) -> tuple[int, float]:
     """Least number of evaluations of a round, and without progress before the search ends; and least work then, where optima are
     several."""
-    return (FIRST, LITTLE) if gradients else (FIRST_WITHOUT, 0.0)
+    return (FIRST, WORK.little) if gradients else (FIRST_WITHOUT, 0.0)
 
 
 def judged(

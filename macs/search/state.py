@@ -9,7 +9,7 @@ import numpy as np
 
 from ..evaluation.evaluator import INFEASIBLE, Evaluation, Evaluator
 from ..evaluation.linear_models import Samples
-from ..gradients.counted import PolishLog
+from ..gradients.polish import PolishLog
 from ..io.text import counted
 from ..pareto import archive as archives
 from ..pareto.archive import Archive
@@ -108,7 +108,7 @@ class SearchState:
     polished : Archive, optional
         What the last polish made.
     in_vain : array (k, 2 m), optional
-        What polishes need not try again; see `CountedSolves`.
+        What polishes need not try again; see `BudgetedSolves`.
     rounds : Rounds, optional
         Of a search without a number of evaluations.
     """

@@ -13,7 +13,7 @@ from compiled_cases import compiled
 from smooth_problems import compass, corners, shuttle, slide, still, two_wells, with_peak
 
 from macs import Front, optimize, payoff, sweep
-from macs.gradient_tools import targets
+from macs.gradients.ends import tasks_between
 from problems import Problem, load
 from problems.cases.goddard import reference as goddard_reference
 from problems.cases.orbit_rise import reference as orbit_reference
@@ -291,14 +291,14 @@ def test_peaks_used_otherwise_are_refused_before_any_work(tool) -> None:
 
 def test_targets_are_even_and_no_more_than_asked() -> None:
     ends = np.array([[0.0, 10.0], [2.0, 0.0]])
-    down = targets(ends, np.ptp(ends, axis=0), 5, "pascoletti-serafini")
-    assert np.array([reference for reference, _ in down]) == pytest.approx(np.array([[0.5, 7.5], [1, 5], [1.5, 2.5]])[::-1])
-    limited = targets(ends, np.ptp(ends, axis=0), 4, "epsilon")
-    assert sorted(reference[1] for reference, _ in limited) == pytest.approx([10 / 3, 20 / 3])
+    down = tasks_between(ends, np.ptp(ends, axis=0), 5, "pascoletti-serafini")
+    assert np.array([task.reference for task in down]) == pytest.approx(np.array([[0.5, 7.5], [1, 5], [1.5, 2.5]])[::-1])
+    limited = tasks_between(ends, np.ptp(ends, axis=0), 4, "epsilon")
+    assert sorted(task.reference[1] for task in limited) == pytest.approx([10 / 3, 20 / 3])
     for m in (3, 4):
         for points in (m, 10, 40):
             for method in ("epsilon", "pascoletti-serafini"):
-                assert len(targets(1 - np.eye(m), np.ones(m), points, method)) + m <= points
+                assert len(tasks_between(1 - np.eye(m), np.ones(m), points, method)) + m <= points
 
 
 def test_importing_stays_light() -> None:

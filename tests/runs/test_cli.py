@@ -332,7 +332,7 @@ def test_ctrl_c_keeps_what_gradient_tools_found(capsys, monkeypatch):
     def then_interrupted(self, *task, **more):
         found = solve(self, *task, **more)
         # A second Ctrl-C would end the work at once.
-        if self.counts.gradient_solves == 4 and not interrupted:
+        if self.solves.counts.gradient_solves == 4 and not interrupted:
             interrupted.append(signal.raise_signal(signal.SIGINT))
         return found
 

@@ -11,8 +11,7 @@ from fronts import distance_to_curve, inverted_distance
 from macs import MACS
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
-from macs.gradients.counted import CountedSolves
-from macs.gradients.polish import _ends, _helped_by_neighbours, polish
+from macs.gradients.polish import BudgetedSolves, _ends, _helped_by_neighbours, polish
 from macs.pareto.archive import Archive
 from macs.preferences import ReferencePoint
 from macs.search.gradient_action import allowed
@@ -74,7 +73,7 @@ def test_a_polished_archive_lies_on_the_front_with_its_ends_and_evenly() -> None
     rng = np.random.default_rng(1)
     Z = np.column_stack([rng.uniform(0.8, 0.9, 10), np.sort(rng.uniform(0.2, 1.3, 10))])
     state = state_of(evaluator, Z)
-    archive = polish(state.archive, CountedSolves(evaluator, 10_000), 10)
+    archive = polish(state.archive, BudgetedSolves(evaluator, 10_000), 10)
     assert len(archive) == 10 and archive.Z[:, 0] == pytest.approx(1.0)
     angles = np.sort(archive.Z[:, 1])
     assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
@@ -84,7 +83,7 @@ def test_a_polished_archive_lies_on_the_front_with_its_ends_and_evenly() -> None
 def test_a_polish_fills_empty_places() -> None:
     evaluator = Circle()
     state = state_of(evaluator, np.array([[0.9, 0.3], [0.9, 1.2]]))
-    state.archive = polish(state.archive, CountedSolves(evaluator, 10_000), 6)
+    state.archive = polish(state.archive, BudgetedSolves(evaluator, 10_000), 6)
     assert len(state.archive) == 6
 
 
@@ -92,7 +91,7 @@ def test_a_polish_fills_empty_places() -> None:
 def test_no_more_solves_than_allowed() -> None:
     evaluator = Circle()
     state = state_of(evaluator, np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)]))
-    solves = CountedSolves(evaluator, 3)
+    solves = BudgetedSolves(evaluator, 3)
     state.archive = polish(state.archive, solves, 5)
     assert evaluator.counts.gradient_solves == 3 and solves.left == 0
     assert 3 <= len(state.archive) <= 5
@@ -122,7 +121,7 @@ def test_few_solves_are_not_spent_on_a_crowd() -> None:
     evaluator = Circle()
     rng = np.random.default_rng(1)
     state = state_of(evaluator, np.column_stack([rng.uniform(0.8, 0.9, 30), np.linspace(0.7, 0.8, 30)]))
-    state.archive = polish(state.archive, CountedSolves(evaluator, 20), 30)
+    state.archive = polish(state.archive, BudgetedSolves(evaluator, 20), 30)
     angles = np.sort(state.archive.Z[state.archive.Z[:, 0] == 1.0, 1])
     assert angles[[0, -1]] == pytest.approx([0.0, np.pi / 2], abs=1e-3)
     assert np.count_nonzero((angles < 0.65) | (angles > 0.85)) >= 6
@@ -174,7 +173,7 @@ def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
     for solves in (36, 200):
         sphere = Sphere()
         state = state_of(sphere, crowd)
-        state.archive = polish(state.archive, CountedSolves(sphere, solves), 30)
+        state.archive = polish(state.archive, BudgetedSolves(sphere, solves), 30)
         assert len(state.archive) <= 30 and state.archive.Z[:, 0] == pytest.approx(1.0)
         assert uncovered(state.archive.F, sphere) < 0.3
 
@@ -185,7 +184,7 @@ def test_solves_of_a_guided_surface_go_where_points_are_wanted(hoped) -> None:
     wanted = ReferencePoint({goal.name: value for goal, value in zip(goals, hoped, strict=True)})
     region = Region.of(wanted, goals, SURFACE)
     state = state_of(sphere, np.column_stack([rng.uniform(0.85, 0.9, 20), rng.uniform(0.1, 1.4, (20, 2))]))
-    archive = polish(state.archive, CountedSolves(sphere, 40), 20, guide=PreferenceGuide(wanted, goals))
+    archive = polish(state.archive, BudgetedSolves(sphere, 40), 20, guide=PreferenceGuide(wanted, goals))
     assert len(sphere.found) == 40 and region.contains(np.array(sphere.found[6:])).mean() > 0.5, "all but those of the ends"
     assert region.contains(archive.F).sum() >= 10
 
@@ -289,7 +288,7 @@ def test_what_is_worse_or_failed_is_not_taken() -> None:
     evaluator = Useless()
     Z = np.column_stack([np.full(5, 0.9), np.linspace(0.2, 1.3, 5)])
     state = state_of(evaluator, Z)
-    state.archive = polish(state.archive, CountedSolves(evaluator, 1000), 5)
+    state.archive = polish(state.archive, BudgetedSolves(evaluator, 1000), 5)
     assert np.array_equal(np.sort(state.archive.Z[:, 1]), Z[:, 1])
 
 
@@ -358,7 +357,7 @@ def test_optima_that_are_known_are_not_solved_again(kind) -> None:
             return descend(starts, references, weights)
 
         evaluator.descend = noted
-        polish(archive, CountedSolves(evaluator, 200), 6, optima=known)
+        polish(archive, BudgetedSolves(evaluator, 200), 6, optima=known)
         return sum((row == np.hstack([Z, archive.F])).all(axis=1).any() for row in asked)
 
     assert again(None) > 0 and again(archive) == 0
@@ -369,7 +368,7 @@ def test_what_is_no_better_than_an_optimum_gives_way_to_it() -> None:
     optima = Archive(np.arange(3.0)[:, None], np.array([[0.0, 1.0], [0.5, 0.5], [1.0, 0.0]]), np.zeros(3))
     off = np.array([[-1e-9, 0.0], [-1e-6, -1e-6], [0.0, -1e-3]])
     archive = Archive(optima.Z + 10.0, optima.F + off, np.array([0.0, 1e-6, 0.0]))
-    found = polish(archive, CountedSolves(Answers(), 0), 3, optima=optima)
+    found = polish(archive, BudgetedSolves(Answers(), 0), 3, optima=optima)
     assert sorted(found.Z[:, 0].tolist()) == [0.0, 1.0, 12.0]
 
 
@@ -391,7 +390,7 @@ def test_an_end_gives_way_to_a_flight_that_is_far_worse_only_for_a_gain() -> Non
     for gain, place in ((1e-6, 1.0), (1e-3, 101.0)):
         # The least of objective 0 with a worse objective 1; then nothing new.
         evaluator = Answers([-gain, 5.0], [1.0, 0.0], [9.0, 9.0], [9.0, 9.0])
-        found = _ends(archive, np.ones(2), CountedSolves(evaluator, 4), np.empty((0, 2)))  # type: ignore[arg-type]
+        found = _ends(archive, np.ones(2), BudgetedSolves(evaluator, 4), np.empty((0, 2)))  # type: ignore[arg-type]
         assert found.Z[0, 0] == place
 
 
@@ -399,7 +398,7 @@ def test_with_few_solves_poor_points_start_from_what_nearly_dominates_them() -> 
     F = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0], [0.4, 0.4, 0.4], [0.9, 0.9, 0.35], [0.35, 0.8, 0.9]])
     archive = Archive(np.arange(6.0)[:, None], F, np.zeros(6))
     evaluator = Answers(*[[9.0, 9.0, 9.0]] * 4)
-    assert _helped_by_neighbours(archive, CountedSolves(evaluator, 4)) is archive  # type: ignore[arg-type]
+    assert _helped_by_neighbours(archive, BudgetedSolves(evaluator, 4)) is archive  # type: ignore[arg-type]
     assert [start[0] for start in evaluator.starts] == [3.0, 3.0], "of four solves two, from the point in the middle"
 
 
@@ -407,9 +406,9 @@ def test_what_neighbours_did_not_improve_is_not_tried_again_but_what_is_new_is()
     F = np.array([[0.0, 1.0], [0.4, 0.4], [1.0, 0.0]])
     archive = Archive(np.arange(3.0)[:, None], F, np.zeros(3))
     evaluator = Answers(*[[9.0, 9.0]] * 20)
-    solves = CountedSolves(evaluator, 20)  # type: ignore[arg-type]
+    solves = BudgetedSolves(evaluator, 20)  # type: ignore[arg-type]
     assert _helped_by_neighbours(archive, solves) is archive and len(evaluator.starts) == 6
-    again = CountedSolves(evaluator, 20, in_vain=solves.in_vain)  # type: ignore[arg-type]
+    again = BudgetedSolves(evaluator, 20, failed_pairs=solves.failed_pairs)  # type: ignore[arg-type]
     assert _helped_by_neighbours(archive, again) is archive and len(evaluator.starts) == 6
     moved = Archive(archive.Z, F - [[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]], archive.violation)
     _helped_by_neighbours(moved, again)
@@ -422,7 +421,7 @@ def test_where_all_starts_are_alike_none_is_made_from_neighbours() -> None:
     made = []
     for alike in (False, True):
         evaluator = Answers(*[[9.0, 9.0]] * 40)
-        found = polish(optima, CountedSolves(evaluator, 40), 3, optima=optima, alike=alike)  # type: ignore[arg-type]
+        found = polish(optima, BudgetedSolves(evaluator, 40), 3, optima=optima, alike=alike)  # type: ignore[arg-type]
         assert np.array_equal(np.sort(found.Z[:, 0]), [0.0, 1.0, 2.0])
         made.append(len(evaluator.starts))
     assert made[0] == made[1] + 6

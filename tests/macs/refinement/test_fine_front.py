@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from macs.gradients.ends import ENDS, moved_along
 
 from macs import Front, sweep
 from macs.evaluation.evaluator import CONVERGED
-from macs.gradients.targets import MOVED, moved_along
 from macs.refinement.fine_front import solved_on
 from macs.refinement.mesh_loop import Programs
 from problems import Problem
@@ -102,7 +102,7 @@ def test_points_move_along_with_the_ends(a, b, before, after, share):
     new = np.array([[b, a + after[1]], [b + after[0], a]])
     F = old[:1] + share * (old[1:] - old[:1])
     references, weights = moved_along(F, old, new, np.array(before))
-    if np.abs((new - old) / before).max() > MOVED:
+    if np.abs((new - old) / before).max() > ENDS.moved:
         assert references == pytest.approx(new[:1] + share * (new[1:] - new[:1]), abs=1e-9) and weights == pytest.approx(after)
     else:
         assert references is F and weights == pytest.approx(before)
@@ -111,7 +111,7 @@ def test_points_move_along_with_the_ends(a, b, before, after, share):
 def test_without_both_ends_or_with_small_moves_points_are_where_they_were():
     F, units = np.array([[0.5, 0.5]]), np.ones(2)
     old = np.array([[0.0, 1.0], [1.0, 0.0]])
-    for before, after in ((F[:0], F[:0]), (old, old + 0.9 * MOVED), (old, np.ones((2, 2)))):
+    for before, after in ((F[:0], F[:0]), (old, old + 0.9 * ENDS.moved), (old, np.ones((2, 2)))):
         references, weights = moved_along(F, before, after, units)
         assert references is F and weights is units
-    assert moved_along(F, old, old + 1.1 * MOVED, units)[0] == pytest.approx(F + 1.1 * MOVED)
+    assert moved_along(F, old, old + 1.1 * ENDS.moved, units)[0] == pytest.approx(F + 1.1 * ENDS.moved)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from macs import optimize
-from macs.gradients.multistart import GradientSolves
+from macs.gradients.scalarised import GradientSolves, Scalarised
 from macs.refinement.found_optimum import found_optimum
 from macs.refinement.guessed_mesh import COUNTS, guessed_elements
 from macs.refinement.mesh_loop import MeshLoop, Programs
@@ -102,10 +102,10 @@ def test_what_is_worse_than_another_mesh_achieved_is_not_good(monkeypatch):
         return real
 
     monkeypatch.setattr(loop, "refine", spoiled)
-    best = found_optimum(loop, np.zeros(1), np.ones(1), lambda nlp: None, 1, np.random.default_rng(0), coarse)
+    best = found_optimum(loop, Scalarised.single(0, 1), lambda nlp: None, 1, np.random.default_rng(0), coarse)
     assert best.good and best.behind == 0.0 and best.refinement.best.F[0] == pytest.approx(4.0, rel=1e-3)
     amounts, unsettled = iter([0.0, 1.0]), iter([1e-2, 0.0])
-    other = found_optimum(loop, np.zeros(1), np.ones(1), lambda nlp: None, 1, np.random.default_rng(0), coarse)
+    other = found_optimum(loop, Scalarised.single(0, 1), lambda nlp: None, 1, np.random.default_rng(0), coarse)
     assert not other.good and other.refinement.best.F[0] == pytest.approx(4.0, rel=1e-3)
 
 

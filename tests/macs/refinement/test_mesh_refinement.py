@@ -13,7 +13,7 @@ from synthetic_fronts import black_box, flights
 from macs import MACS, Front
 from macs.fronts.builders import trajectory_columns
 from macs.fronts.verification import verify
-from macs.gradients.multistart import GradientSolves
+from macs.gradients.scalarised import GradientSolves
 from macs.refinement.mesh_loop import MeshLoop
 from problems import Problem, load
 from problems.cases.goddard import reference

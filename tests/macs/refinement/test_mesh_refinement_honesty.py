@@ -12,8 +12,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from macs import optimize, sweep
-from macs.gradients.multistart import GradientSolves
-from macs.gradients.tasks import End
+from macs.gradients.scalarised import GradientSolves, LexicographicEnd, Scalarised
 from macs.refinement.found_optimum import COARSE, found_optimum
 from macs.refinement.mesh_loop import KEPT, MeshLoop, Programs
 from problems import Problem, load
@@ -158,9 +157,9 @@ def begun_on(method: DFET, problem: Problem, wanted: Wanted):
     compiled = problem.compile()
     loop = MeshLoop(Programs(compiled), GradientSolves(1e-8), wanted, 8)
     nlp = loop.programs(method)
-    solved = loop.solves(nlp, nlp.first_guess(np.zeros((1, len(nlp.free))))[0], np.zeros(1), np.ones(1))
+    solved = loop.solves(nlp, nlp.first_guess(np.zeros((1, len(nlp.free))))[0], Scalarised.single(0, 1))
     units = loop.units(solved.F[None], nlp, solved.z)
-    return loop, loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True), End(0, units, solved.F)
+    return loop, loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True), LexicographicEnd.of(0, units, solved.F)
 
 
 def test_what_is_worse_than_it_was_when_simulated_is_no_success():
@@ -201,9 +200,7 @@ def test_a_control_of_low_order_gets_what_a_mixed_constraint_needs():
 def searched(problem: Problem, wanted: Wanted, coarse=COARSE, most_work: float | None = None):
     compiled = problem.compile()
     loop = MeshLoop(Programs(compiled), GradientSolves(1e-6), wanted, 8, most_work)
-    m = len(compiled.goals)
-    reference = np.where(np.arange(m) == 0, 0.0, np.inf)
-    found = found_optimum(loop, reference, np.eye(m)[0], lambda nlp: None, 1, np.random.default_rng(0), coarse)
+    found = found_optimum(loop, Scalarised.single(0, len(compiled.goals)), lambda nlp: None, 1, np.random.default_rng(0), coarse)
     return found, loop
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from macs import MACS, optimize, payoff, sweep
-from macs.gradients.multistart import GradientSolves, MultistartSolver, guessed_start, single_task
+from macs.gradients.multistart import MultistartSolver, guessed_start
+from macs.gradients.scalarised import GradientSolves, Scalarised
 from macs.search.macs import HOPELESS
 from problems import Problem
 from transcription import DFET
@@ -71,11 +72,11 @@ def test_what_is_feasible_is_reached_from_infeasible_solves():
     """With as good as no iterations, a solve from the guess ends where nothing is feasible; one from a feasible vector follows."""
     nlp = DFET(4, 3).nlp(ride(0.0))
     solver = MultistartSolver(nlp, guessed_start(nlp), None, np.random.default_rng(0), GradientSolves(1e-6))
-    task = single_task(0, 2)
+    task = Scalarised.single(0, 2)
     with solver.solves.at_most(2):
-        poor = solver.solve(*task)
+        poor = solver.solve(task)
     assert poor.status != "converged" and poor.violation > 1e-3
-    assert solver.reached(poor, *task).status == "converged" and solver.closest is None
+    assert solver.with_feasible_start(poor, task).status == "converged" and solver.closest is None
 
 
 @pytest.mark.slow

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from macs import MACS, payoff
 from macs.evaluation.bilevel import Bilevel
 from macs.gradients import multistart
-from macs.gradients.multistart import MultistartSolver
+from macs.gradients.multistart import MULTISTART, MultistartSolver
 from macs.search import opening
 from macs.search.state import SearchState
 from problems import Problem, load
@@ -119,7 +121,7 @@ def test_where_solves_for_feasibility_find_nothing_no_candidate_is_projected() -
 
 @pytest.mark.slow
 def test_what_nothing_makes_feasible_is_projected(monkeypatch) -> None:
-    monkeypatch.setattr(multistart, "TRIED", (1, 0))
+    monkeypatch.setattr(multistart, "MULTISTART", replace(MULTISTART, infeasible=(1, 0)))
     evaluator = projecting(walk(least=0.5), METHOD)
     state = begun(evaluator)
     assert not len(state.archive) and not len(state.optima)
@@ -154,9 +156,9 @@ def test_ends_that_were_alike_are_not_sought_again_where_others_were_not(monkeyp
     assert state.alike.all() and not state.several
     original = MultistartSolver.from_vector
 
-    def noted(self, start, reference, weights):
-        tasks.append(np.flatnonzero(weights).tolist())
-        return original(self, start, reference, weights)
+    def noted(self, start, task):
+        tasks.append(np.flatnonzero(task.weights).tolist())
+        return original(self, start, task)
 
     monkeypatch.setattr(MultistartSolver, "from_vector", noted)
     for alike, ends in (([True, True], [[0], [1], [0], [1]]), ([True, False], [[1]] * 4)):

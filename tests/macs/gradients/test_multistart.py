@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs import optimize, payoff, sweep
-from macs.gradients.multistart import GradientSolves, MultistartSolver, is_least, single_task
-from macs.gradients.starts import FEWEST, FIRST, MANY, MOST, Census, Starts
+from macs.gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Starts, is_least
+from macs.gradients.scalarised import GradientSolves, Scalarised
 from problems import Problem, load
 from transcription import DFET
 from transcription.nlp.scalarized import Solved
@@ -30,55 +30,55 @@ def wells(depths: list[float], width: float = 0.02) -> Problem:
     return problem
 
 
-def census_of(losses: list[float | None]) -> Census:
-    census = Census()
+def after(losses: list[float | None]) -> MultistartStopping:
+    rule = MultistartStopping()
     for loss in losses:
-        census.add(loss)
-    return census
+        rule.add(loss)
+    return rule
 
 
 def test_the_same_again_and_again_is_enough():
     """Boender and Rinnooy Kan: with w = 1 the next start finds another optimum with probability 2 / (k (k - 1)), 0.0048 for k = 21."""
-    assert not census_of([1.0] * 20).enough and census_of([1.0] * 21).enough
-    assert not census_of([1.0, 2.0] * 17).enough and census_of([1.0, 2.0] * 18).enough, "6 / (k (k - 1)) falls below it at 36"
+    assert not after([1.0] * 20).enough and after([1.0] * 21).enough
+    assert not after([1.0, 2.0] * 17).enough and after([1.0, 2.0] * 18).enough, "6 / (k (k - 1)) falls below it at 36"
 
 
 def test_many_optima_need_twice_as_many_starts_as_the_best():
-    improving = census_of([float(-k) for k in range(MOST - 1)])
-    assert not improving.enough and census_of([float(-k) for k in range(MOST)]).enough
-    early = census_of([-100.0, *map(float, range(MANY - 2))])
+    improving = after([float(-k) for k in range(MULTISTART.most - 1)])
+    assert not improving.enough and after([float(-k) for k in range(MULTISTART.most)]).enough
+    early = after([-100.0, *map(float, range(MULTISTART.many - 2))])
     assert not early.enough
     early.add(-3.0)
-    assert early.enough and early.optima() == MANY
+    assert early.enough and early.optima() == MULTISTART.many
 
 
 def test_nothing_that_converges_is_soon_enough():
-    assert not census_of([None] * (FEWEST - 1)).enough and census_of([None] * FEWEST).enough
-    empty = census_of([None])
-    assert (empty.starts, empty.converged, empty.optima(), empty.times()) == (1, 0, 0, 0)
+    assert not after([None] * (MULTISTART.fewest - 1)).enough and after([None] * MULTISTART.fewest).enough
+    empty = after([None])
+    assert (empty.starts, empty.converged, empty.optima(), empty.hits()) == (1, 0, 0, 0)
 
 
 @pytest.mark.slow
 @given(st.lists(st.sampled_from([1.0, 2.0, 5.0, None]), min_size=1, max_size=40), st.floats(-8e-6, 8e-6))
-def test_counts_of_a_census(losses, noise):
-    census = census_of([None if loss is None else loss * (1.0 + noise * (k % 2)) for k, loss in enumerate(losses)])
+def test_counts_of_starts(losses, noise):
+    rule = after([None if loss is None else loss * (1.0 + noise * (k % 2)) for k, loss in enumerate(losses)])
     known = [loss for loss in losses if loss is not None]
-    assert census.starts == len(losses) and census.converged == len(known)
-    assert census.optima() == len(set(known))
-    assert census.times() == (known.count(min(known)) if known else 0)
+    assert rule.starts == len(losses) and rule.converged == len(known)
+    assert rule.optima() == len(set(known))
+    assert rule.hits() == (known.count(min(known)) if known else 0)
 
 
 def test_starts_are_near_the_best_or_anywhere():
     nlp = DFET(6, 4).transcribe(load("goddard"))
     starts, best = Starts(nlp, np.random.default_rng(0)), nlp.first_guess(nlp.lower[nlp.free][None] + 0.5 * nlp.span[nlp.free])[0]
-    drawn = np.array([starts.draw(best)[0] for _ in range(FIRST + 40)])
+    drawn = np.array([starts.draw(best)[0] for _ in range(MULTISTART.everywhere + 40)])
     free = (drawn - best)[:, nlp.free] / nlp.span[nlp.free]
     assert (drawn[:, nlp.free] >= nlp.lower[nlp.free]).all() and (drawn[:, nlp.free] <= nlp.upper[nlp.free]).all()
     deviation = np.sqrt((free**2).mean(axis=1))
-    near, anywhere = deviation[FIRST + 1 :: 2], deviation[FIRST::2]
+    near, anywhere = deviation[MULTISTART.everywhere + 1 :: 2], deviation[MULTISTART.everywhere::2]
     assert np.median(near) < 0.5 * np.median(anywhere) and near.min() < 0.05
     again = Starts(nlp, np.random.default_rng(0))
-    assert np.array_equal([again.draw(best)[0] for _ in range(FIRST + 40)], drawn)
+    assert np.array_equal([again.draw(best)[0] for _ in range(MULTISTART.everywhere + 40)], drawn)
 
 
 def test_near_the_best_controls_deviate_in_a_window():
@@ -88,7 +88,7 @@ def test_near_the_best_controls_deviate_in_a_window():
     (profile, *_) = nlp.profiles
     kept = []
     for seed in range(40):
-        moved = Starts(nlp, np.random.default_rng(seed), FIRST + 1).draw(best)[0]
+        moved = Starts(nlp, np.random.default_rng(seed), MULTISTART.everywhere + 1).draw(best)[0]
         deviation = np.abs(moved - best)[nlp.free][profile.columns]
         kept.append(np.mean(deviation < 1e-3 * deviation.max()))
     assert np.mean(np.array(kept) > 0.2) > 0.25 and min(kept) == 0.0 and max(kept) > 0.5
@@ -180,7 +180,7 @@ def test_what_bounds_allow():
         z = solver.nlp.lower.copy()
         z[[place, end, last]] = p, tf, 1.0  # the turn at the beginning grows with its first node, and falls with its last
         solved = Solved(z, *solver.nlp.evaluate(z[None])[0], 0.0, status, 1)
-        return [solver.is_least(solved, single_task(i, 5)[0]) for i in range(5)]
+        return [solver.is_least(solved, Scalarised.single(i, 5)) for i in range(5)]
 
     assert least(1.0, 1.0) == [True, True, False, True, False]
     assert least(1.0, 1.001) == [False, True, False, True, False]
@@ -190,4 +190,4 @@ def test_what_bounds_allow():
     best = solver.nlp.lower.copy()
     best[[place, end]] = 1.0, 1.0
     one, two = (np.where(np.arange(5) < k, 0.0, np.inf) for k in (1, 2))
-    assert is_least(solver.nlp, best, one) and not is_least(solver.nlp, best, two)
+    assert is_least(solver.nlp, best, Scalarised(one, np.ones(5))) and not is_least(solver.nlp, best, Scalarised(two, np.ones(5)))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from macs.gradients.tasks import End
+from macs.gradients.scalarised import LexicographicEnd
 from transcription.nlp.scalarized import Solved
 
 UNITS, KNOWN = np.array([1.0, 10.0]), np.array([2.0, 5.0])
@@ -19,8 +18,8 @@ class Solves:
         self.ceilings: list[np.ndarray | None] = []
         self.starts: list[float] = []
 
-    def __call__(self, nlp, start, reference, weights, ceiling=None) -> Solved:
-        self.ceilings.append(ceiling)
+    def __call__(self, nlp, start, task, near=False) -> Solved:
+        self.ceilings.append(task.ceiling)
         self.starts.append(float(start[0]))
         return self.answers[len(self.ceilings) - 1]
 
@@ -41,7 +40,7 @@ FAR = Mesh((0.0, 0.0), 1.0)
 
 def solved(*answers: tuple[str, tuple[float, float]], mesh: Mesh = FAR) -> tuple[Solved, Solves]:
     solves = Solves(*answers)
-    return End(0, UNITS, KNOWN).solve(solves, mesh, np.array([-1.0])), solves  # type: ignore[arg-type]
+    return LexicographicEnd.of(0, UNITS, KNOWN).solve(solves, mesh, np.array([-1.0])), solves  # type: ignore[arg-type]
 
 
 def test_an_end_that_stays_is_solved_once_for_each_objective():

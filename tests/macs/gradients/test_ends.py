@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
 
 from macs import optimize, payoff
-from macs.gradients import lexicographic
-from macs.gradients.lexicographic import lexicographic_ends
-from macs.gradients.multistart import GradientSolves, MultistartSolver
+from macs.gradients import ends
+from macs.gradients.ends import ENDS, lexicographic_ends
+from macs.gradients.multistart import MultistartSolver
+from macs.gradients.scalarised import GradientSolves, Scalarised
 from problems import Problem
 from transcription import DFET
 
@@ -31,15 +34,14 @@ def optimum_from(solver: MultistartSolver, i: int, p: float):
     place = [v.name for v in solver.nlp.variables].index("p")
     start = solver.nlp.first_guess(np.zeros((1, len(solver.nlp.free))))[0]
     start[place] = p
-    return solver.from_vector(start, np.where(np.arange(2) == i, 0.0, np.inf), np.eye(2)[i]), place
+    return solver.from_vector(start, Scalarised.single(i, 2)), place
 
 
-@pytest.mark.parametrize(("small", "soon"), [(lexicographic.SMALL, lexicographic.SOON), (0, lexicographic.SOON), (0, 1)])
+@pytest.mark.parametrize(("small", "soon"), [(ENDS.small, ENDS.soon), (0, ENDS.soon), (0, 1)])
 @pytest.mark.parametrize("other", [GOOD, POOR])
 def test_an_end_lies_in_the_best_valley_that_is_known(monkeypatch, other, small, soon):
     """Also where a program is not small, and where no solve without slack ends soon."""
-    monkeypatch.setattr(lexicographic, "SMALL", small)
-    monkeypatch.setattr(lexicographic, "SOON", soon)
+    monkeypatch.setattr(ends, "ENDS", replace(ENDS, small=small, soon=soon))
     solver = solver_of_two_valleys()
     (first, place), (second, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, other)
     end = lexicographic_ends(solver, [first, second])[0]
@@ -50,8 +52,8 @@ def test_an_end_lies_in_the_best_valley_that_is_known(monkeypatch, other, small,
 
 def test_optima_that_are_not_given_are_found():
     solver = solver_of_two_valleys()
-    ends = lexicographic_ends(solver)
-    assert len(ends) == 2 and ends[0].F[0] < 1e-10 and ends[1].F[0] == pytest.approx(1.0, abs=1e-5)
+    both = lexicographic_ends(solver)
+    assert len(both) == 2 and both[0].F[0] < 1e-10 and both[1].F[0] == pytest.approx(1.0, abs=1e-5)
 
 
 def test_an_end_is_also_sought_from_those_of_the_others():
@@ -71,8 +73,7 @@ def test_an_end_is_also_sought_from_those_of_the_others():
 @pytest.mark.parametrize("power", [2, 4])
 def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch, power):
     """Of p^power and -p, the first has one optimum: with a slack s of a range of 1, the second gains s^(1 / power), for the slack alone."""
-    monkeypatch.setattr(lexicographic, "SMALL", 0)
-    monkeypatch.setattr(lexicographic, "SOON", 1)
+    monkeypatch.setattr(ends, "ENDS", replace(ENDS, small=0, soon=1))
     problem = Problem("vertical")
     run = problem.phase("run", t0=0.0, tf=1.0)
     x, p = run.state("x", bounds=(-2, 2), initial=0), problem.parameter("p", bounds=(-1, 1))
@@ -83,26 +84,26 @@ def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch
     (one, place), (other, _) = optimum_from(solver, 0, 0.0), optimum_from(solver, 1, 0.9)
     assert np.abs(one.F).max() < 1e-6 and np.abs(other.F - [1, -1]).max() < 1e-6
     slack = np.array([1e-5, 0.0])
-    near = solver.near(one.z, np.array([np.inf, 0.0]), np.array([0.0, 1.0]), np.array([1e-5, np.inf]))
+    near = solver.from_vector(one.z, Scalarised.single(1, 2, np.array([1e-5, np.inf])), near=True)
     assert near.F[1] == pytest.approx(-(1e-5 ** (1 / power)), rel=0.01)
-    assert lexicographic._worth(near, 1, slack) == pytest.approx(2 / power * 1e-5 ** (1 / power), rel=0.01)
-    before = solver.counts.gradient_solves
-    end, _ = lexicographic._tied(solver, 1, one, np.array([one.F[0], np.inf]), np.ones(2), other)
+    assert ends._worth(near, 1, slack) == pytest.approx(2 / power * 1e-5 ** (1 / power), rel=0.01)
+    before = solver.solves.counts.gradient_solves
+    end, _ = ends._tied(solver, 1, one, np.array([one.F[0], np.inf]), np.ones(2), other)
     assert end.F[0] <= one.F[0] + 1e-8 and abs(end.z[place]) < 1e-2
-    assert power == 4 or (end is one and solver.counts.gradient_solves == before + 2)
+    assert power == 4 or (end is one and solver.solves.counts.gradient_solves == before + 2)
 
 
 def test_a_solve_whose_iterations_ran_out_goes_on_where_much_was_gained():
     solver = solver_of_two_valleys()
     start = solver.nlp.first_guess(np.zeros((1, len(solver.nlp.free))))[0]
-    task = np.array([np.inf, 0.0]), np.array([0.0, 1.0])
+    task = Scalarised.single(1, 2)
     with solver.solves.at_most(3):
-        short = solver.from_vector(start, *task)
+        short = solver.from_vector(start, task)
     assert short.status == "failed" and short.iterations == 3
-    assert lexicographic._gone_on(solver, short, short.F[1] - 1e-3, *task) is short
-    on = lexicographic._gone_on(solver, short, short.F[1] + 1e-3, *task)
+    assert ends._gone_on(solver, short, short.F[1] - 1e-3, task) is short
+    on = ends._gone_on(solver, short, short.F[1] + 1e-3, task)
     assert on.status == "converged" and on.F[1] < short.F[1]
-    assert lexicographic._gone_on(solver, on, np.inf, *task) is on
+    assert ends._gone_on(solver, on, np.inf, task) is on
 
 
 @pytest.mark.slow

@@ -1,0 +1,293 @@
+"""The ends of a front, the lexicographic optima of its objectives sought from each other, and the points between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+
+import numpy as np
+
+from transcription.nlp.scalarized import Solved
+from transcription.nlp.scaling import nlp_scales
+from transcription.stopping import stopping
+
+from ..evaluation.evaluator import CONVERGED
+from ..pareto.directions import divisions_below, simplex_lattice
+from .multistart import MULTISTART, MultistartSolver, alpha_of
+from .scalarised import WORK, Scalarised
+
+METHODS = ("pascoletti-serafini", "epsilon")
+"""Scalarisations of a sweep."""
+
+
+@dataclass(frozen=True)
+class EndsLimits:
+    """How lexicographic optima are sought; parts of an objective are of its range between the ends."""
+
+    # Part that is more than the tolerance of the objectives before it explains: if an objective falls by more while these keep their least
+    # values, it was not determined by them, and a point where it is lower by more lies in another valley.
+    loose: float = 1e-2
+    slack: float = 1e-5  # part that may be lost where the others cannot be improved without any loss
+    soon: int = 50  # most iterations of a solve that is to improve the others without a loss
+    ties: int = 150  # the same with a loss
+    small: int = 600  # most variables of a program whose iterations take so little that `ties` are spent without slack, too
+    unsure: float = 0.2  # part of what a slack is worth, as its multipliers say, that is not known
+    rounds: int = 5  # most rounds in which optima are sought from each other
+    gain: float = 1e-6  # what counts as a gain then, in scales
+    from_rivals: int = 3  # most times that results along a front are sought again from a better start that another one gave
+    moved: float = 0.05  # where the ends of a front move by more than this part, the points between them move along
+
+
+ENDS = EndsLimits()
+
+
+def lexicographic_ends(solver: MultistartSolver, singles: Sequence[Solved] = ()) -> list[Solved]:
+    """The lexicographic optimum of each objective: its least value, then those of the others in their order.
+
+    Each is without a loss in those before, or, where no solve achieves that, with a loss of `EndsLimits.slack`. It begins at the
+    `singles`, the optima of each objective alone, in their order; those that are not given are found first. Each is also sought from the
+    ends of the others: they are found in different valleys.
+    """
+    m = len(solver.nlp.problem.goals)
+    optima, tried = list(singles), dict[tuple[int, int], np.ndarray]()
+    while (i := len(optima)) < m:
+        begun = solver.nearest(Scalarised.single(i, m))
+        optima.append(solver.single(i))
+        tried |= {(i, k): optima[k].F for k in range(i) if begun is not None and np.array_equal(begun, optima[k].z)}
+    ends: list[Solved | None] = [None] * m
+    for _ in range(ENDS.rounds):
+        _from_each_other(solver, optima, tried)
+        for i in range(m):
+            if optima[i] is not ends[i]:
+                ends[i] = _lexicographic(solver, i, optima)
+        if all(one is end for one, end in zip(optima, ends, strict=True)):
+            break
+        optima = [end for end in ends if end is not None]
+    return optima
+
+
+def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict[tuple[int, int], np.ndarray]) -> None:
+    """Replace optima of single objectives by better ones that short solves from those of the others find, until there are none.
+
+    `tried` has the objectives of the optimum k from which objective i was sought before, by (i, k); a solve from another one like it is
+    not worth its time.
+    """
+    m, scales = len(optima), nlp_scales(solver.nlp)
+    for _ in range(ENDS.rounds):
+        improved = False
+        for i, k in permutations(range(m), 2):
+            if optima[k].status != CONVERGED or solver.is_least(optima[i], Scalarised.single(i, m)):
+                continue
+            spans = _spans(optima)
+            if (i, k) in tried and (np.abs(optima[k].F - tried[i, k]) <= ENDS.loose * spans).all():
+                continue
+            tried[i, k] = optima[k].F
+            with solver.solves.at_most(ENDS.ties):
+                found = solver.from_vector(optima[k].z, Scalarised.single(i, m))
+                found = _gone_on(solver, found, optima[i].F[i] - ENDS.loose * spans[i], Scalarised.single(i, m))
+            # What an end has lost to the others is none.
+            gain = max(ENDS.gain * scales[i], 2 * ENDS.slack * spans[i])
+            if found.status == CONVERGED and (optima[i].status != CONVERGED or optima[i].F[i] - found.F[i] > gain):
+                optima[i], improved = found, True
+        if not improved:
+            break
+
+
+def _lexicographic(solver: MultistartSolver, i: int, optima: Sequence[Solved]) -> Solved:
+    """The end of objective i; see `lexicographic_ends`."""
+    best, m = optima[i], len(optima)
+    if best.status != CONVERGED:
+        return best
+    ceiling, least, spans = np.full(m, np.inf), best.F[i], _spans(optima)
+    for j in (k for k in range(m) if k != i):
+        ceiling[i] = best.F[i]
+        if not solver.is_least(best, Scalarised.single(j, m)):
+            best, ceiling = _tied(solver, j, best, ceiling, spans, optima[j])
+        ceiling[j] = best.F[j]
+    # A range may be no more than rounding, where objectives are in no conflict: no solve can tell such a loss.
+    if best.F[i] - least > MULTISTART.excess * max(spans[i], nlp_scales(solver.nlp)[i]):
+        # What was lost for the others is worth a little of what they gained.
+        near = np.where(np.arange(m) == i, np.inf, best.F + ENDS.slack * spans)
+        with solver.solves.at_most(ENDS.ties):
+            again = solver.from_vector(best.z, Scalarised.single(i, m, near))
+        best = again if again.status == CONVERGED and again.F[i] < best.F[i] else best
+    return best
+
+
+def _tied(
+    solver: MultistartSolver, j: int, best: Solved, ceiling: np.ndarray, spans: np.ndarray, optimum: Solved
+) -> tuple[Solved, np.ndarray]:
+    """The least value of objective j, with that of `optimum`, among the points within a ceiling (m,), which `best` attains; and the
+    ceiling, with `EndsLimits.slack` where it was needed.
+
+    Often there is but one such point; nothing is then strictly inside, and a solve would take long to find nothing.
+    """
+    alone, large = Scalarised.single(j, len(spans), ceiling), ENDS.loose * abs(best.F[j] - optimum.F[j])
+    small = len(best.z) <= ENDS.small
+    with solver.solves.at_most(ENDS.ties if small else ENDS.soon):
+        # No slack: where the front is steep, a small loss in one objective changes another by its square root.
+        solved = solver.solve(alone, best.z)
+        for _ in range(ENDS.rounds if small else 0):
+            if solved.status == CONVERGED or not best.F[j] - solved.F[j] > large:
+                break
+            # Much was gained before the iterations ran out.
+            solved = solver.solve(alone, solved.z)
+    if solved.status != CONVERGED:
+        solved, ceiling = _tied_with_slack(solver, j, best, ceiling, ENDS.slack * spans, large)
+    if optimum.status == CONVERGED and best.F[j] - solved.F[j] > large:
+        # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
+        # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.
+        with solver.solves.at_most(ENDS.ties):
+            other = solver.from_vector(optimum.z, replace(alone, ceiling=ceiling))
+        if other.status == CONVERGED and solved.F[j] - other.F[j] > large:
+            solved = other
+    return solved, ceiling
+
+
+def _tied_with_slack(
+    solver: MultistartSolver, j: int, best: Solved, ceiling: np.ndarray, slack: np.ndarray, large: float
+) -> tuple[Solved, np.ndarray]:
+    """See `_tied`: what is found with slack (m,) first, in fewer iterations, and then without if more was gained than that is worth."""
+    m = len(slack)
+    exactly, freer = Scalarised.single(j, m, ceiling), Scalarised.single(j, m, ceiling + slack)
+    with solver.solves.at_most(ENDS.ties):
+        near = solver.from_vector(best.z, freer, near=True)
+        if near.status != CONVERGED:
+            near = _gone_on(solver, solver.from_vector(best.z, freer), best.F[j] - large, freer)
+        if near.status != CONVERGED:
+            return best, ceiling
+        gain, explained = best.F[j] - near.F[j], (1 + ENDS.unsure) * _worth(near, j, np.where(ceiling < np.inf, slack, 0.0))
+        if gain <= max(slack[j], explained):
+            return best, ceiling
+        # However a solve without slack ends, it counts if it keeps the objectives before, and lacks only what the slack is worth.
+        enough = np.where(np.arange(m) == j, near.F[j] + max(large, explained), ceiling + MULTISTART.excess / ENDS.slack * slack)
+        exact = solver.from_vector(near.z, exactly, near=True)
+        if not _within(solver, exact, enough):
+            exact = _gone_on(solver, exact, best.F[j] - large, exactly)
+    if exact.status == CONVERGED or _within(solver, exact, enough):
+        return (replace(exact, status=CONVERGED), ceiling) if exact.F[j] < best.F[j] else (best, ceiling)
+    return (near, ceiling + slack) if gain > large else (best, ceiling)
+
+
+def _within(solver: MultistartSolver, solved: Solved, enough: np.ndarray) -> bool:
+    """Whether a result is feasible, and its objectives are at most as large as `enough` (m,)."""
+    return bool(solved.violation <= solver.solves.tolerance and (enough >= solved.F).all())
+
+
+def _gone_on(solver: MultistartSolver, solved: Solved, enough: float, task: Scalarised) -> Solved:
+    """A result for one objective; where it did not converge but is below a value that is `enough`, that of a solve near it."""
+    promising = solved.status != CONVERGED and solved.F[task.moving][0] < enough
+    return solver.from_vector(solved.z, task, near=True) if promising else solved
+
+
+def _worth(solved: Solved, j: int, slack: np.ndarray) -> float:
+    """What slacks (m,) of the other objectives are worth in objective j, at its optimum within them: their multipliers are its slopes.
+
+    Where the front is vertical, the gain is as the square root of the slack, twice what the slope says.
+    """
+    assert solved.multipliers is not None
+    return float(2 * solved.multipliers[: len(slack)] @ slack / solved.multipliers[j])
+
+
+def _spans(optima: Sequence[Solved]) -> np.ndarray:
+    """Ranges (m,) of the objectives between the optima that were found, at least one."""
+    return np.ptp([one.F for one in optima if one.status == CONVERGED], axis=0)
+
+
+def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[Solved]:
+    """The results of all tasks, in their order.
+
+    A result that is better for another task than that task's own result becomes a start for it. With several starts, each task is also
+    solved from the result of the next one. If the solver is to make as many starts as pay, all tasks get others in turn, as long as these
+    find better results, and take no more work than the tasks themselves, or little.
+    """
+    before, found = solver.solves.counts.work, [solver.solve(task) for task in tasks]
+    if (solver.starts or 1) > 1:
+        for k in range(len(tasks) - 2, -1, -1):
+            found[k] = solver.better([found[k], solver.from_vector(found[k + 1].z, tasks[k])], tasks[k])
+    _from_rivals(solver, tasks, found)
+    if solver.starts is None:
+        limit = solver.solves.counts.work + max(WORK.little, solver.solves.counts.work - before)
+        while _from_other_starts(solver, tasks, found, limit):
+            _from_rivals(solver, tasks, found)
+    return found
+
+
+def _from_rivals(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved]) -> None:
+    """Replace results by better ones, from what was found for other tasks, as long as there are any."""
+    for _ in range(ENDS.from_rivals):
+        rivals = [solver.rival(solved, task) for solved, task in zip(found, tasks, strict=True)]
+        for k, rival in enumerate(rivals):
+            if rival is not None:
+                found[k] = solver.from_rival(rival, found[k], tasks[k])
+        if all(rival is None for rival in rivals):
+            break
+
+
+def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved], limit: float) -> bool:
+    """Solve each task from another start; returns whether that replaced a result."""
+    replaced = False
+    for k, task in enumerate(tasks):
+        if solver.drawn_enough or solver.solves.counts.work >= limit or stopping():
+            return False
+        with solver.solves.at_most(MULTISTART.iterations):
+            other = solver.from_drawn(task, found[k] if found[k].status == CONVERGED else None)
+        alpha, known = alpha_of(task, other), alpha_of(task, found[k])
+        if alpha is not None and (known is None or alpha < known - MULTISTART.clearly):
+            found[k], replaced = other, True
+    return replaced
+
+
+def check_points(points: int, m: int) -> None:
+    """Raise ValueError if so many points are too few for a front of m objectives."""
+    if m == 1:
+        raise ValueError("a problem with one objective has no front to sweep; use optimize")
+    if points < m:
+        raise ValueError(f"points must be at least {m}, one for each objective, not {points}")
+
+
+def tasks_between(ends: np.ndarray, ranges: np.ndarray, points: int, method: str) -> list[Scalarised]:
+    """Scalarised problems whose solutions, with the ends, make a front of at most `points` points. ends (m, m), ranges (m,)."""
+    if np.count_nonzero(ranges) < 2:
+        return []
+    return (_from_simplex if method == "pascoletti-serafini" else _at_limits)(ends, ranges, points)
+
+
+def _from_simplex(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Scalarised]:
+    """Tasks from a lattice on the simplex between the ends, with the ranges as weights."""
+    m = len(ends)
+    inner = [share for share in simplex_lattice(m, divisions_below(m, points)) if share.max() < 1.0]
+    # An objective with zero range has weight 0: its reference is a hard limit.
+    level = np.where(ranges > 0, ends, ends.max(axis=0))
+    return [Scalarised(share @ level, ranges) for share in inner]
+
+
+def _at_limits(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Scalarised]:
+    """Tasks for the first objective that is in conflict, at all combinations of evenly spread limits of the others."""
+    m = len(ends)
+    first, *others = np.flatnonzero(ranges > 0)
+    levels = int((points - m) ** (1.0 / len(others)) + 1e-9)
+    # With two objectives the loosest limit gives an end; with more, combinations with it are new points.
+    shares = np.arange(1, levels + 1) / (levels + (len(others) == 1))
+    tasks = []
+    for combination in product(shares, repeat=len(others)):
+        reference = ends.max(axis=0)
+        reference[first] = 0.0
+        reference[others] -= (1.0 - np.array(combination)) * ranges[others]
+        tasks.append(Scalarised(reference, np.where(np.arange(m) == first, ranges, 0.0)))
+    return tasks
+
+
+def moved_along(F: np.ndarray, old: np.ndarray, new: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where points of a front are solved from when it is solved again, and along which weights.
+
+    That is where they are, unless the ends of the front have moved; then it is the same place between these. F (k, m), old, new (m, m),
+    units (m,).
+    """
+    if not len(old) or len(units) == 1 or np.abs((new - old) / units).max() <= ENDS.moved:
+        return F, units
+    before, after = np.ptp(old, axis=0), np.ptp(new, axis=0)
+    if not ((before > 0) & (after > 0)).all():
+        return F, units
+    return new.min(axis=0) + (F - old.min(axis=0)) * (after / before), after

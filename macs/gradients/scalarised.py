@@ -1,0 +1,214 @@
+"""Scalarised problems of several objectives, and their gradient solves, which are counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from transcription.base import NLP
+from transcription.nlp.elastic import least_violation
+from transcription.nlp.scalarized import Solved, scalarize
+from transcription.stopping import stopping
+
+from ..evaluation.evaluator import CONVERGED, Counts
+
+
+@dataclass(frozen=True, eq=False)
+class Scalarised:
+    """From a reference along weights to the front (Pascoletti and Serafini 1984); see `scalarize`.
+
+    minimise alpha   subject to   F_i - reference_i <= alpha weights_i,   F_i <= ceiling_i
+    """
+
+    reference: np.ndarray  # (m,): infinite for an objective that is left out
+    weights: np.ndarray  # (m,): 0 where the reference is a hard limit
+    ceiling: np.ndarray | None = None  # (m,)
+    units: np.ndarray = field(default_factory=lambda: np.ones(1))  # (m,): what counts as one in each objective; default: 1
+
+    @classmethod
+    def single(cls, i: int, m: int, ceiling: np.ndarray | None = None) -> Scalarised:
+        """Objective i of m alone."""
+        return cls(np.where(np.arange(m) == i, 0.0, np.inf), np.eye(m)[i], ceiling)
+
+    @property
+    def used(self) -> np.ndarray:
+        """Mask (m,) of the objectives that matter."""
+        return self.reference < np.inf
+
+    @property
+    def sharp(self) -> np.ndarray:
+        """Mask (m,) of those that a solve determines as exactly as its tolerance."""
+        return self.used
+
+    @property
+    def moving(self) -> np.ndarray:
+        """Mask (m,) of the objectives that are minimised."""
+        return (self.reference < np.inf) & (self.weights > 0)
+
+    @property
+    def hard(self) -> np.ndarray:
+        """Mask (m,) of the objectives with a hard limit."""
+        return (self.reference < np.inf) & (self.weights <= 0)
+
+    def alpha(self, F: np.ndarray) -> Any:
+        """What is minimised, at objectives (..., m)."""
+        moving = self.moving
+        return np.max((F[..., moving] - self.reference[moving]) / self.weights[moving], axis=-1, initial=-np.inf)
+
+    def loss(self, F: np.ndarray) -> float:
+        """Alpha and the excess over hard limits at objectives (m,), in units."""
+        units = np.broadcast_to(self.units, self.weights.shape)
+        moving, hard = self.moving, self.hard
+        alpha = self.alpha(F) * np.max((self.weights / units)[moving])
+        return float(alpha + np.maximum((F - self.reference)[hard] / units[hard], 0.0).sum())
+
+    def rank(self, solved: Solved) -> tuple[bool, float]:
+        """Results that converged before others, by their loss; the others by their violation."""
+        failed = solved.status != CONVERGED
+        return failed, solved.violation if failed else self.loss(solved.F)
+
+    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
+        """The result of gradient solves from a vector (n,), or near it only."""
+        return solves(nlp, start, self, near)
+
+
+@dataclass(frozen=True)
+class EndLimits:
+    """How an end of a front is solved on another mesh."""
+
+    room: float = 0.05  # how much worse other objectives may become, in units, before the end is also sought near where it was
+    tied: float = 1e-6  # what counts as no loss of its own objective then, in units
+    close: float = 1e-3  # violation up to which a start on another mesh is nearly the end itself
+
+
+END = EndLimits()
+
+
+@dataclass(frozen=True, eq=False)
+class LexicographicEnd(Scalarised):
+    """The least value of one objective, and for that the least values of the others, on another mesh."""
+
+    # (m,): Objectives of the end on the mesh before. Many points may have the least value of the one objective, such as its bound: one with
+    # the others near these is preferred.
+    known: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, i: int, units: np.ndarray, known: np.ndarray) -> LexicographicEnd:
+        """That of objective i. units, known (m,)."""
+        return cls(np.where(np.arange(len(units)) == i, 0.0, np.inf), units, None, units, known)
+
+    @property
+    def objective(self) -> int:
+        """The number of the objective."""
+        return int(np.argmin(self.reference))
+
+    @property
+    def used(self) -> np.ndarray:
+        """See `Scalarised.used`."""
+        return np.ones(len(self.weights), dtype=bool)
+
+    @property
+    def sharp(self) -> np.ndarray:
+        """See `Scalarised.sharp`: where the front is steep, the others are determined by the root of an error of the first."""
+        return self.moving
+
+    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
+        """See `Scalarised.solve`."""
+        mine, units = self.moving, self.weights
+        alone = Scalarised(self.reference, units)
+        first = solves(nlp, start, alone, near)
+        if len(units) == 1:
+            return first
+        assert self.known is not None
+        ceiling = np.where(mine, np.inf, self.known + END.room * units)
+        if not stopping() and (first.status != CONVERGED or (ceiling < first.F).any()):
+            held = solves(nlp, start, replace(alone, ceiling=ceiling), near)
+            if held.status == CONVERGED and (first.status != CONVERGED or self.loss(held.F) <= self.loss(first.F) + END.tied):
+                first = held
+        if first.status != CONVERGED:
+            return first
+        # No slack: where the front is steep, a small loss in one objective changes another by its square root.
+        others = Scalarised(np.where(mine, np.inf, first.F), units, np.where(mine, first.F, np.inf))
+        # The first solve does not look at the other objectives, and often leaves a start that was nearly the end.
+        (F,), (violation,) = nlp.evaluate(start[None])
+        closer = violation <= END.close and bool((first.F >= F).all())
+        second = solves(nlp, start if closer else first.z, others, near)
+        # What tells whether the one objective is at its least are the multipliers for that alone.
+        return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
+
+
+MOST_ITERATIONS = 500
+"""Iterations of IPOPT after which a strategy of a solve is given up by default."""
+
+
+@dataclass(frozen=True)
+class WorkLimits:
+    """What may be spent, as `Counts.work`: iterations times variables, so that no clock decides."""
+
+    building: float = 30.0  # iterations that take as long as it takes to make a program with its derivatives: measured 18 to 53
+    little: float = 6e5  # what other starts may always take together: a second or two
+    most: float = 1.5e6  # after which no mesh of a single optimum is begun: some half a minute, more where programs are large
+
+
+WORK = WorkLimits()
+
+
+class GradientSolves:
+    """Gradient solves with one tolerance, which are counted."""
+
+    def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
+        self.tolerance, self.max_iterations = tolerance, max_iterations
+        self.counts, self._persistent = Counts(), True
+        self.before: Callable[[], None] = lambda: None
+
+    def __call__(self, nlp: NLP, start: np.ndarray, task: Scalarised, near: bool = False) -> Solved:
+        """The result of one solve from a vector (n,), or near it only; see `scalarize`."""
+        self.before()
+        limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations, "persistent": self._persistent}
+        aim: dict[str, Any] = {"reference": task.reference, "weights": task.weights, "ceiling": task.ceiling}
+        return self._counted(nlp, scalarize(nlp, start, **aim, near=near, **limits))
+
+    def least_violation(self, nlp: NLP, start: np.ndarray) -> Solved:
+        """What is feasible, or violates least, near a vector (n,); see `least_violation`."""
+        self.before()
+        return self._counted(nlp, least_violation(nlp, start, tolerance=self.tolerance))
+
+    def _counted(self, nlp: NLP, solved: Solved) -> Solved:
+        self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
+        return solved
+
+    @contextmanager
+    def at_most(self, iterations: int) -> Iterator[None]:
+        """Solves within take no more iterations than these, of which the first strategy may take all."""
+        usual = self.max_iterations
+        self.max_iterations, self._persistent = min(usual, iterations), False
+        try:
+            yield
+        finally:
+            self.max_iterations, self._persistent = usual, True
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A vector z (n,) at which a solve begins, whether it looks near that only, and by how much its result may be worse than is known."""
+
+    z: np.ndarray
+    near: bool = False
+    drift: float = 0.0
+
+
+def best_of(task: Scalarised, solves: GradientSolves, nlp: NLP, starts: Iterable[Start], bound: float = -np.inf) -> Solved:
+    """The best result of solves from starts in turn, until one loses no more than its start may, compared with a bound."""
+    best: Solved | None = None
+    for start in starts:
+        solved = task.solve(solves, nlp, start.z, start.near)
+        if best is None or task.rank(solved) < task.rank(best):
+            best = solved
+        if stopping() or (best.status == CONVERGED and task.loss(best.F) <= bound + start.drift):
+            break
+    assert best is not None
+    return best
