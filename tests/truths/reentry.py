@@ -23,7 +23,8 @@ import moocore
 import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
-from macs.gradients.multistart import GradientSolves, MultistartSolver
+from macs.gradients.multistart import MultistartSolver
+from macs.gradients.scalarised import GradientSolves, Scalarised
 from macs.io.atomic import write_whole
 from macs.io.console import Steps
 from macs.pareto.directions import across, simplex_lattice
@@ -87,7 +88,7 @@ class Truth:
 
     def solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray) -> Solved:
         """One solve, remembered if it converges."""
-        solved = self.descents.from_vector(start, reference, weights, ceiling)
+        solved = self.descents.from_vector(start, Scalarised(reference, weights, ceiling))
         if solved.status == CONVERGED:
             self.found.append(solved)
         return solved

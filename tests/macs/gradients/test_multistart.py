@@ -75,7 +75,7 @@ def test_starts_are_near_the_best_or_anywhere():
     free = (drawn - best)[:, nlp.free] / nlp.span[nlp.free]
     assert (drawn[:, nlp.free] >= nlp.lower[nlp.free]).all() and (drawn[:, nlp.free] <= nlp.upper[nlp.free]).all()
     deviation = np.sqrt((free**2).mean(axis=1))
-    near, anywhere = deviation[MULTISTART.everywhere + 1 :: 2], deviation[MULTISTART.everywhere::2]
+    near, anywhere = deviation[MULTISTART.everywhere + 1 :: 2], deviation[MULTISTART.everywhere :: 2]
     assert np.median(near) < 0.5 * np.median(anywhere) and near.min() < 0.05
     again = Starts(nlp, np.random.default_rng(0))
     assert np.array_equal([again.draw(best)[0] for _ in range(MULTISTART.everywhere + 40)], drawn)

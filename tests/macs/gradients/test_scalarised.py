@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from macs.gradients.scalarised import LexicographicEnd
 from transcription.nlp.scalarized import Solved
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from macs.gradients.polish import Surface, cover
 from scipy.optimize import brentq
 
 from macs.decisions import ReferencePoint
 from macs.evaluation.evaluator import CONVERGED, Evaluation
+from macs.gradients.polish import Surface, cover
 from macs.pareto.archive import Archive
 from macs.pareto.directions import across, simplex_lattice
 from macs.search.guide import PreferenceGuide

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from macs.gradients.ends import ENDS, moved_along
 
 from macs import Front, sweep
 from macs.evaluation.evaluator import CONVERGED
+from macs.gradients.ends import ENDS, moved_along
 from macs.refinement.fine_front import solved_on
 from macs.refinement.mesh_loop import Programs
 from problems import Problem
