@@ -8,6 +8,7 @@ import importlib
 import importlib.util
 import inspect
 import os
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -55,6 +56,17 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     **{STANDARD + name: (address, f"published: {text}") for name, (address, text) in standard.cases().items()},
 }
+FORMER = {
+    "problems.cases.betts:problem": "betts",
+    "problems.cases.betts_heating:problem": "betts_heating",
+    "problems.cases.four_bar_truss:problem": "four_bar_truss",
+    "problems.cases.welded_beam:problem": "welded_beam",
+    "problems.cases.aerocapture.codesign.case:problem": "aerocapture_codesign",
+    **{f"problems.cases.reentry.case{i}:problem": f"reentry_case{i}" for i in (1, 2, 3)},
+}
+"""Names of cases by addresses that they had, which saved fronts may carry."""
+FORMER_STANDARD = re.compile(r"problems\.cases\.standard\.\w+\.(\w+):problem")
+"""Those of the published problems, each of which was a module."""
 FILE = "_problem_file_"
 """Beginning of the names of modules that are read from files."""
 LARGEST = 2**24
@@ -90,6 +102,13 @@ def describe(name: str) -> str:
     return CASES[name][1]
 
 
+def address_of(name: str) -> str:
+    """The address of a case, by its name or by an address that it had; any other as it is."""
+    former = FORMER_STANDARD.fullmatch(name)
+    case = FORMER.get(name, name) if former is None else STANDARD + former[1]
+    return CASES[case][0] if case in CASES else name
+
+
 def is_catalogued(address: str) -> bool:
     """True for a name of the catalogue and for the address of one of its cases: then `load` runs no code but the project's own.
 
@@ -103,7 +122,7 @@ def is_catalogued(address: str) -> bool:
     >>> is_catalogued("goddard"), is_catalogued("my_problem.py:build")
     (True, False)
     """
-    return address in CASES or any(address == own for own, _ in CASES.values())
+    return any(address_of(address) == own for own, _ in CASES.values())
 
 
 def load(name: str, **data: Any) -> Any:
@@ -135,7 +154,7 @@ def load(name: str, **data: Any) -> Any:
     >>> load("goddard")
     Problem('goddard', ...)
     """
-    address = CASES[name][0] if name in CASES else name
+    address = address_of(name)
     place, _, function_name = address.rpartition(":")
     if name.endswith(".py"):
         raise ValueError(f"'{name}' is a file; name its function that makes the problem, too: '{name}:function'")

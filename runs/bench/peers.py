@@ -19,7 +19,7 @@ import numpy as np
 from macs import optimize
 from macs.io.console import Steps
 from problems import Problem, load
-from problems.cases.standard.phases import delta_iii as launcher
+from problems.cases.standard import delta_iii as launcher
 from transcription import parse
 
 from .measured import Column, Row, Target, short, table, verdicts

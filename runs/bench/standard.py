@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from macs import optimize
 from macs.io.console import Steps
 from problems import load
-from problems.cases.standard import SHARE, Published, cases, published
+from problems.cases.standard import SHARE, PublishedOptimum, cases, published
 from problems.catalogue import STANDARD
 
 from ..execution.apart import CRASHED, LATE, lines_apart
@@ -75,7 +75,7 @@ def apart(name: str, i: int, limit: float, steps: Steps) -> dict[str, float | st
     return {"status": ended, "seconds": limit} if ended else json.loads(lines[-1])
 
 
-def compared(case: str, record: Published, found: dict[str, float | str]) -> Row:
+def compared(case: str, record: PublishedOptimum, found: dict[str, float | str]) -> Row:
     """The row of a problem; its `who` is the verdict."""
     values = {key: float(value) for key, value in found.items() if key != "status"}
     if found["status"] in (LATE, CRASHED):

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType, SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from macs.front import Front
 from macs.fronts.pictures.style import label
 from macs.io.atomic import read_whole
 from macs.pareto.dominance import nondominated
-from problems.catalogue import CASES
+from problems.catalogue import CASES, address_of
 from problems.compiled import Objective
 
 from ..files import DATA_BYTES, check_known, errors_begin_with
@@ -69,8 +69,10 @@ def foreign(objectives: np.ndarray, goals: Sequence[Objective], name: str = "for
     )
 
 
-def module_of(case: str) -> ModuleType:
-    """The module of a case. It may also have
+def module_of(case: str) -> SimpleNamespace:
+    """What the module of a case has by name; in one of several cases, what begins with the function's own name and "_" goes first.
+
+    It may also have
 
     - `reference() -> array (k, m)`: its true front, in the user's units and senses;
     - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration, and `LAW`, its name;
@@ -79,11 +81,13 @@ def module_of(case: str) -> ModuleType:
     - `dispersed(front, settings)`: what becomes of each point of a front under dispersions, `{way to fly: outcome}`, the nominal case
       first, where an outcome has `measures() -> {(name, unit): value}`; and `Dispersions`, the dataclass of the settings.
     """
-    place = (CASES[case][0] if case in CASES else case).rpartition(":")[0]
+    place, _, function = address_of(case).rpartition(":")
     try:
-        return importlib.import_module(place)
+        found = vars(importlib.import_module(place))
     except (ModuleNotFoundError, ValueError, TypeError) as error:
         raise ValueError(f"there is no problem '{case}'; there are {', '.join(CASES)}") from error
+    own = {name.removeprefix(f"{function}_"): value for name, value in found.items() if name.startswith(f"{function}_")}
+    return SimpleNamespace(**(found | own))
 
 
 def closed_form(case: str, data: Mapping[str, Any] = MappingProxyType({})) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import ModuleType
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,7 +52,7 @@ class Flights:
     solver: str  # the first solver that found points; the front is that of all its runs together
     points: tuple[Point, ...]
     many: Sequence[Point]  # up to a hundred of that front, for pictures of a population
-    case: ModuleType | None  # the module of the problem, see `references.module_of`
+    case: SimpleNamespace | None  # the module of the problem, see `references.module_of`
     laws: Mapping[str, Sequence[Law | None]]  # one for each point, None where there is none
     # The optimum of each objective alone, by gradients, on the same transcription unless it is unsuited to them; empty if there is none.
     ends: Front
@@ -187,7 +187,7 @@ def _ends(front: Front) -> tuple[Front, str]:
     return found, f"Alone, {', '.join(failed)} did not converge." if failed else ""
 
 
-def _laws(place: ModuleType | None, points: Sequence[Point]) -> list[Law | None]:
+def _laws(place: SimpleNamespace | None, points: Sequence[Point]) -> list[Law | None]:
     """The best flights of the same durations, where the case knows them."""
     law: Callable[[float], Law] | None = getattr(place, "optimal_flight", None)
     if law is None:

@@ -16,7 +16,7 @@ from macs.gradients.scalarised import GradientSolves, LexicographicEnd, Scalaris
 from macs.refinement.found_optimum import COARSE, found_optimum
 from macs.refinement.mesh_loop import KEPT, MeshLoop, Programs
 from problems import Problem, load
-from problems.cases.standard.collection import published
+from problems.cases.standard import published
 from transcription import DFET, parse
 from transcription.base import NLP
 from transcription.meshes.verdict import Wanted

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from macs import MACS, NSGA2
 from macs.refinement.search_mesh import COARSE, MOST, _together, default_transcription, found_mesh
 from problems import Problem, load
-from problems.cases.standard.collection import published
+from problems.cases.standard import published
 from transcription import parse
 from transcription.phases.mesh import PhaseMesh
 

@@ -11,11 +11,9 @@ from math import cos, pi, radians, sin, sqrt
 
 import casadi as ca
 
-from ....phase import Phase
-from ....problem import Problem
-from ..published import Published
-
-PUBLISHED = (Published("mass", 7529.7123, 5e-4, "Rao et al. 2010: 7529.712; YAPSS 0.2.3, example delta_iii_ascent: 7529.71227"),)
+from ...phase import Phase
+from ...problem import Problem
+from .published import optimum
 
 MU, EARTH, SPIN, GRAVITY = 3.986012e14, 6378145.0, 7.29211585e-5, 9.80665
 DENSITY, HEIGHT, DRAG = 1.225, 7200.0, 0.5 * 4 * pi
@@ -30,8 +28,12 @@ START = {"x": EARTH * cos(LATITUDE), "y": 0.0, "z": EARTH * sin(LATITUDE), "vx":
 TIMES = (0.0, 75.2, 150.4, 261.0, 961.0)
 
 
-def problem() -> Problem:
-    """The guess stays on the pad for two phases and is in orbit, at its perigee, for the others."""
+@optimum("mass", 7529.7123, 5e-4, "Rao et al. 2010: 7529.712; YAPSS 0.2.3, example delta_iii_ascent: 7529.71227")
+def delta_iii() -> Problem:
+    """A launcher in four phases.
+
+    The guess stays on the pad for two phases and is in orbit, at its perigee, for the others.
+    """
     problem = Problem("delta_iii")
     total = 9 * BOOSTER[0] + FIRST[0] + SECOND[0] + PAYLOAD
     goal = perigee()

@@ -11,20 +11,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.integrate import solve_ivp
 
-from ....problem import Problem
-from ..published import Published
-
-PUBLISHED = (
-    Published(
-        "weight",
-        0.2201791,
-        5e-7,
-        "Betts 2010, section 6.3: throttle -9.09081, 86810.0 s; on 100 elements of order 4: 0.2201791, -9.0932, 86812.3 s",
-        remark="PSOPT has 0.2203380, with a direction whose squared length may be 1.001",
-    ),
-)
+from ...problem import Problem
+from .published import optimum
 
 IMPULSE, MU, GRAVITY, THRUST, EARTH = 450.0, 1.407645794e16, 32.174, 4.446618e-3, 20925662.73
 ZONAL = {2: 1082.639e-6, 3: -2.565e-6, 4: -1.608e-6}
@@ -35,8 +24,18 @@ FINAL_P, FINAL_E, FINAL_I = 40007346.015232, 0.73550320568829, 0.61761258786099
 GUESSED_TIME, GUESSED_FACTOR = 86810.0, -25.0
 
 
-def problem() -> Problem:
-    """The guess is that of Betts and PSOPT: a flight with the thrust along the velocity."""
+@optimum(
+    "weight",
+    0.2201791,
+    5e-7,
+    "Betts 2010, section 6.3: throttle -9.09081, 86810.0 s; on 100 elements of order 4: 0.2201791, -9.0932, 86812.3 s",
+    remark="PSOPT has 0.2203380, with a direction whose squared length may be 1.001",
+)
+def low_thrust() -> Problem:
+    """Many turns around the earth, to a high orbit.
+
+    The guess is that of Betts and PSOPT: a flight with the thrust along the velocity.
+    """
     problem = Problem("low_thrust")
     factor = problem.parameter("throttle", bounds=(-50.0, 0.0))
     transfer = problem.phase("transfer", t0=0.0, tf=(50000.0, 100000.0))
@@ -97,6 +96,8 @@ def _along(x: list[Any]) -> list[Any]:
 
 def _flight() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (n,), states (7, n) and controls (3, n) of the guess."""
+    from scipy.integrate import solve_ivp  # slow to import
+
     x = [ca.SX.sym(name) for name in BOUNDS]
     rates = ca.Function("rates", [ca.vertcat(*x)], [ca.vertcat(*_rates(x, _along(x), GUESSED_FACTOR))])
     along = ca.Function("along", [ca.vertcat(*x)], [ca.vertcat(*_along(x))])

@@ -12,12 +12,9 @@ from math import pi, radians
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import CubicSpline, RBFInterpolator
 
-from ....problem import Problem
-from ..published import Published
-
-PUBLISHED = (Published("time", 320.4588, 0.02, "YAPSS 0.2.3, example minimum_time_to_climb: 320.4588"),)
+from ...problem import Problem
+from .published import optimum
 
 AREA, GRAVITY, IMPULSE, WEIGHT = 530.0, 32.174, 1600.0, 42000.0
 NEAR = 1e-5
@@ -61,8 +58,12 @@ THRUST = (
 """Thousands of pounds, for each Mach number at rising altitudes; None where the table has no entry."""
 
 
-def problem() -> Problem:
-    """In feet, slugs, seconds and radians."""
+@optimum("time", 320.4588, 0.02, "YAPSS 0.2.3, example minimum_time_to_climb: 320.4588")
+def climb() -> Problem:
+    """The quickest climb of a supersonic aircraft, with tables.
+
+    In feet, slugs, seconds and radians.
+    """
     problem = Problem("climb")
     climb = problem.phase("climb", t0=0.0, tf=(100.0, 800.0))
     h = climb.state("altitude", bounds=(0, 69000), initial=0, final=65600, unit="ft")
@@ -89,6 +90,8 @@ def problem() -> Problem:
 
 def _thrust() -> ca.Function:
     """Thrust in pounds over Mach number and altitude: cubes of distances from the entries of the table, and a spline through a grid."""
+    from scipy.interpolate import RBFInterpolator  # slow to import
+
     entries = [
         (mach / THRUST_MACH[-1], altitude / THRUST_ALTITUDE[-1], 1000 * value)
         for mach, row in zip(THRUST_MACH, THRUST, strict=True)
@@ -104,6 +107,8 @@ def _thrust() -> ca.Function:
 
 def _spline(name: str, points: np.ndarray | tuple[float, ...], values: np.ndarray | tuple[float, ...]) -> ca.Function:
     """The cubic spline of a table, prolonged on both sides: what is tried there is nonsense, but has to be a number."""
+    from scipy.interpolate import CubicSpline  # slow to import
+
     beyond = 0.2 * (points[-1] - points[0])
     outside = np.array([points[0] - beyond, points[-1] + beyond])
     before, after = CubicSpline(points, values)(outside)

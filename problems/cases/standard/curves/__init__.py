@@ -1,1 +1,0 @@
-"""Classical problems of the best curve."""

@@ -1,1 +1,0 @@
-"""Flights with smooth controls, without active constraints along the way."""

@@ -1,1 +1,0 @@
-"""Problems with active state or mixed constraints along the way."""

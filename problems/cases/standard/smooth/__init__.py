@@ -1,1 +1,0 @@
-"""Problems with smooth controls, without active constraints along the way."""

@@ -1,1 +1,0 @@
-"""Problems with bang-bang controls."""
