@@ -15,12 +15,11 @@ from problems.vector_problem import VectorProblem
 from transcription.base import Transcription
 
 from .fronts import files
-from .fronts.merging import merge
+from .fronts.builders import merge
 from .fronts.points import Points
-from .fronts.simulated import simulated
 from .fronts.spreadsheets import save_csv
 from .fronts.tables import front_html, front_table, headline
-from .fronts.verified import VERIFY, unmarked, verified
+from .fronts.verified import VERIFY, simulated, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
 from .refinement.mending import mended
@@ -323,7 +322,7 @@ class Front(Points):
         ValueError
             If there are none or too many, or one has no trajectory.
         """
-        from .fronts.pictures.several_flights import draw_flights
+        from .fronts.pictures.flight_plot import draw_flights
         from .fronts.pictures.style import check_no_path
 
         check_no_path(figure, f"front.plot_trajectories({list(points)})[0]")
@@ -337,7 +336,7 @@ class Front(Points):
         ValueError
             For trajectories: `front[i].plot()` draws one of them.
         """
-        from .fronts.pictures.design_plot import draw_designs
+        from .fronts.pictures.front_plot import draw_designs
         from .fronts.pictures.style import check_no_path
 
         check_no_path(figure, "front.plot_variables()[0]")

@@ -29,7 +29,7 @@ from transcription.stopping import Stopped
 
 from .evaluation.evaluator import CONVERGED, INFEASIBLE
 from .front import Front
-from .fronts.builders import certified, conflict, no_points, vectors_points
+from .fronts.builders import certified, conflict, from_vectors, no_points
 from .fronts.point import Point
 from .fronts.points import Points
 from .fronts.provenance import costs
@@ -354,7 +354,7 @@ class _Job:
                 words = f"{self._about['name']}: {reason} before the first solve"
                 raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
             self._stopped = interrupts.reason
-            points = vectors_points(
+            points = from_vectors(
                 found.nlp,
                 found.z[None],
                 self._about,
@@ -417,7 +417,7 @@ class _Job:
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
         status = [solved.status for solved in found]
         return Front.of(
-            vectors_points(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges, self._sole), **more)
+            from_vectors(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges, self._sole), **more)
         )
 
     def _found_once(self) -> str:

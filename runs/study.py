@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from macs.fronts.verified import VERIFY
-from macs.io.html import html_block, html_table
+from macs.io.text import html_block, html_table
 from problems.checks import short_repr, unknown
 from problems.compiled import Objective
 from transcription import Smooth

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from macs import Front
-from macs.fronts.builders import vectors_points
+from macs.fronts.builders import from_vectors
 from problems import Problem
 from transcription import DFET
 
@@ -33,7 +33,7 @@ def points(problem: Problem, *controls: list[float], method: DFET = MESH) -> Fro
     nlp = method.transcribe(problem)
     Z = nlp.propagate(nlp.first_guess(np.array(controls, dtype=float)))
     some = {"status": ["converged"] * len(Z), "optimality": [None] * len(Z)}
-    return Front.of(vectors_points(nlp, Z, {"name": "by hand"}, {"tolerance": 1e-6}, **some))
+    return Front.of(from_vectors(nlp, Z, {"name": "by hand"}, {"tolerance": 1e-6}, **some))
 
 
 def constant(*values: float) -> list[list[float]]:

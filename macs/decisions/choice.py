@@ -12,8 +12,7 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..fronts.point import Point
-from ..io.html import html_block, html_table
-from ..io.text import text_table
+from ..io.text import html_block, html_table, text_table
 from ..preferences import Preference, Ranges
 from ..preferences.ranges import confidence
 from ..preferences.stage import ordering

@@ -19,7 +19,7 @@ from transcription.meshed import Meshed
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import OPTIMAL, certified, nearest_violation, vectors_points
+from ..fronts.builders import OPTIMAL, certified, from_vectors, nearest_violation
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
@@ -366,7 +366,7 @@ class Desk:
     def _point(self, outcome: Outcome) -> Point:
         """What was found, as a point of the problem: certified and simulated."""
         scales = objective_scales(self.known) if len(self.known) else None
-        points = vectors_points(
+        points = from_vectors(
             outcome.nlp,
             outcome.z[None],
             {"name": "decide", "settings": {"starts": self._terms.starts}},

@@ -17,7 +17,7 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certified, vectors_points
+from ..fronts.builders import certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import costs
 from ..fronts.verified import unmarked
@@ -173,7 +173,7 @@ class StageSolver:
         """A converged vector as a point that is mended as those of other gradient tools are, beside others of a front, which are confirmed;
         what that costs is counted."""
         about = costs(Counts(), wall_time=0.0, seed=None, tolerance=self.solves.tolerance, reproducible=True)
-        point = vectors_points(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
+        point = from_vectors(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
         found = solved_again(point if among is None else unmarked(Points.concatenate([point, among])), verify)
         spent = {key: found.stats[key] for key in ("gradient_solves", "inner_iterations", "work", "gradient_work")}
         self.solves.counts = self.solves.counts.joined(Counts(**spent, clocked=int(not found.stats["reproducible"])))

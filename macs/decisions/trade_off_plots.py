@@ -10,8 +10,9 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..fronts.pictures.style import COLORS, GREY, STYLE, axis_label, better, label, new_figure, title_and_legend
+from ..fronts.pictures.style import COLORS, GREY, STYLE, axis_label, better, new_figure, title_and_legend
 from ..fronts.points import Points
+from ..io.text import label
 
 DASH = 0.05
 """Length of a dash that shows a slope, in widths of its axes."""

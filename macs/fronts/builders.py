@@ -1,4 +1,4 @@
-"""Points made from vectors of an NLP, and from the archive of a search."""
+"""Points made from vectors of an NLP, from the archive of a search, and from several fronts of one problem."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ from transcription.trajectories.simulate import limits_by_label
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..io.text import counted
 from ..pareto.archive import Archive
+from ..pareto.dominance import nondominated
 from .point import Point
 from .points import Points
+from .provenance import merged_stats
 
 OPTIMAL = 1e-3
 """Largest `optimality`, and largest violation, of points whose multipliers are costates."""
@@ -36,7 +38,7 @@ NAMED, SIDE = 3, 0.1
 """Most constraints that are named where nothing is feasible; part of the largest violation from which on others are, too."""
 
 
-def trajectory_points(
+def from_archive(
     nlp: NLP,
     archive: Archive,
     closest: Archive,
@@ -49,10 +51,10 @@ def trajectory_points(
     archive."""
     if len(archive):
         found = certified(nlp, archive.Z, np.ptp(archive.F, axis=0)) if certify else {}
-        return vectors_points(nlp, archive.Z, solver, stats, **found)
-    nearest = vectors_points(nlp, closest.Z[:1], solver, stats)[0]
+        return from_vectors(nlp, archive.Z, solver, stats, **found)
+    nearest = from_vectors(nlp, closest.Z[:1], solver, stats)[0]
     violated = conflict(nlp, nearest) if certify and _settled(stats) else nearest_violation(nearest)
-    return vectors_points(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {violated}", closest=nearest)
+    return from_vectors(nlp, archive.Z, solver, stats, message=f"{_nothing(stats)}; {violated}", closest=nearest)
 
 
 def no_points(
@@ -106,7 +108,7 @@ def _alone(nlp: NLP, z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray,
     return Conditions.of(nlp, z, np.where(sole, nlp_scales(nlp) if ranges is None else ranges, np.inf))
 
 
-def vectors_points(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Points:
+def from_vectors(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapping[str, Any], **more: Any) -> Points:
     """Points from vectors (k, n) of an NLP; `more` are further arguments of `Points`.
 
     Objectives and violations are evaluated by the NLP, and so is the status, unless it is given.
@@ -156,7 +158,7 @@ def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, A
     }
 
 
-def vector_points(
+def from_vector_problem(
     problem: CompiledVectorProblem,
     archive: Archive,
     closest: Archive,
@@ -204,3 +206,78 @@ def _nothing(stats: Mapping[str, Any]) -> str:
 def _settled(stats: Mapping[str, Any]) -> bool:
     """Whether a search ended since it can find nothing else."""
     return stats.get("stopped") == "settled"
+
+
+def merge(fronts: Sequence[Points]) -> Points:
+    """The non-dominated feasible points of several fronts; see `Front.merge`."""
+    fronts = list(fronts)
+    if not fronts:
+        raise ValueError("there is no front to merge")
+    for front in fronts[1:]:
+        _check(fronts[0], front)
+    union = Points.concatenate([front[front.status == CONVERGED] for front in fronts])
+    kept = union[best_rows(union)].sorted()
+    closest = _closest(fronts)
+    reasons = (front.message for front in fronts if front.closest is closest and front.message)
+    return kept.replace(
+        solver=_solver(fronts),
+        stats=merged_stats([front.stats for front in fronts]),
+        message="" if len(kept) else next(reasons, _nearest(closest)),
+        closest=None if len(kept) else closest,
+    )
+
+
+def best_rows(points: Points, miss: np.ndarray | float = 0.0) -> np.ndarray:
+    """Rows (k,) of the points that belong to a front, in their order.
+
+    Points that were not simulated are compared by their objectives. Verified points are compared among themselves, by their simulated
+    objectives. A point that is not verified never displaces one that is: it belongs to the front as long as no verified point, and no other
+    that is not, is as good. miss (m,).
+    """
+    good = np.flatnonzero(points.verified)
+    good = good[nondominated(points.simulated_F[good])]
+    others = np.flatnonzero(~points.verified)
+    others = others[nondominated(points.F[others])]
+    as_good = (points.simulated_F[good] <= points.F[others][:, None] + miss).all(axis=2).any(axis=1)
+    return np.sort(np.concatenate([good, others[~as_good]]))
+
+
+def _nearest(closest: Point | None) -> str:
+    """The message of a merged front without a feasible point."""
+    if closest is None or not closest.violations:
+        return "no feasible point"
+    return f"no feasible point; {nearest_violation(closest)}"
+
+
+def _check(one: Points, other: Points) -> None:
+    """Raise ValueError if two fronts are of different problems."""
+
+    def problem(front: Points) -> str:
+        return f"'{front.source.name}'" if front.source else "a black box"
+
+    if (one.source and one.source.fingerprint) != (other.source and other.source.fingerprint):
+        same = one.source and other.source and one.source.name == other.source.name
+        why = ": the same name, but other bounds, equations or data" if same else ""
+        raise ValueError(f"fronts of different problems do not merge: {problem(one)} and {problem(other)}{why}")
+    if one.goals != other.goals:
+        raise ValueError(f"fronts with different objectives do not merge: {_objectives(one)} and {_objectives(other)}")
+    if not one.source and one.variables != other.variables:
+        names = [", ".join(v.name for v in front.variables) for front in (one, other)]
+        raise ValueError(f"fronts of black boxes with different variables do not merge: {names[0]} and {names[1]}")
+
+
+def _objectives(front: Points) -> str:
+    return ", ".join(f"{goal.sense} {goal.name} [{goal.unit}]" for goal in front.goals)
+
+
+def _closest(fronts: Sequence[Points]) -> Point | None:
+    found = [front.closest for front in fronts if front.closest is not None]
+    return min(found, key=lambda point: point.violation, default=None)
+
+
+def _solver(fronts: Sequence[Points]) -> dict[str, Any]:
+    """The common solver of the fronts; else the names of all their solvers."""
+    first = fronts[0].solver
+    if all(front.solver == first for front in fronts):
+        return first
+    return {"name": ", ".join(dict.fromkeys(front.solver.get("name", "?") for front in fronts)), "settings": {}}

@@ -1,54 +1,192 @@
-"""Columns of points: one entry for each, read-only; and their decision vectors, which need not be of the same variables: each point may
-have a mesh of its own."""
+"""Columns of a front's file: tables of what they are, named things as arrays and back, JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+import json
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from problems.compiled import Variable
+from problems.compiled import Limit, Variable
+
+from ..io.netcdf import Group, Labelled, Labels, words
+
+NUMBER, COUNT, TEXT = "f", "i", "O"
+"""Kinds of a column: float64, whole numbers, str."""
+KINDS = {NUMBER: "numbers", COUNT: "whole numbers", TEXT: "texts"}
 
 
-def frozen(array: Any) -> np.ndarray:
-    """A read-only copy."""
-    copy = np.array(array)
-    copy.setflags(write=False)
-    return copy
+class Column(NamedTuple):
+    """One array of a file.
+
+    `rows` is the name of the column of `Points` that it is, where it has one entry for each point as it is; `optional`, whether it is left
+    out where the points have no such column.
+    """
+
+    dimensions: tuple[str, ...]
+    kind: str
+    long_name: str
+    units: str = "1"
+    rows: str = ""
+    optional: bool = False
+
+    @property
+    def labels(self) -> Labels:
+        """For the reader of the file."""
+        return Labels(self.dimensions, self.long_name, self.units)
 
 
-def by_first(objectives: np.ndarray) -> np.ndarray:
-    """Rows sorted by the first objective, ties by the next ones; NaN last."""
-    return np.lexsort(objectives.T[::-1])
+def labelled(table: Mapping[str, Column], values: Mapping[str, np.ndarray], attrs: dict[str, Any]) -> Labelled:
+    """Arrays of a table with their labels."""
+    return Labelled(values, {name: table[name].labels for name in values}, attrs)
 
 
-def number(value: Any) -> float | None:
-    """The value as a float; None for None and for NaN."""
-    return None if value is None or np.isnan(value) else float(value)
+def checked(table: Mapping[str, Column], group: Group) -> Labelled:
+    """The arrays of a group, which are those of a table."""
+    unknown = [name for name in group.arrays if name not in table]
+    if unknown:
+        raise ValueError(f"it has an array '{unknown[0]}', which is not known")
+    for name, column in table.items():
+        if name not in group.arrays and not column.optional:
+            raise ValueError(f"'{name}' is missing from it")
+        if name in group.arrays and group.arrays[name].dtype.kind != column.kind:
+            raise ValueError(f"'{name}' has {KINDS[group.arrays[name].dtype.kind]}, not {KINDS[column.kind]}")
+    return labelled(table, group.arrays, group.attrs)
 
 
-def column(values: Any, n: int, name: str) -> Any:
-    """The `values`, which must be n; n times None for None."""
-    if values is None:
-        return [None] * n
-    if len(values) != n:
-        raise ValueError(f"{name} has {len(values)} entries, F has {n} rows")
-    return values
+def legal_names(names: Iterable[str], kind: str, taken: Iterable[str]) -> dict[str, str]:
+    """What arrays and groups are called that have names of the user's: these names, where netCDF allows them and they are not `taken`.
+
+    Else, each character other than a letter, digit or one of ``_ . + -`` becomes ``_``, and `kind` and ``_`` are put before the name until
+    it begins with a letter and is free.
+    """
+    free: dict[str, str] = {}
+    used = set(taken)
+    for name in names:
+        legal = re.sub(r"[^\w.+-]", "_", unicodedata.normalize("NFC", name))
+        while legal in used or not legal[:1].isalpha():
+            legal = f"{kind}_{legal}"
+        used.add(legal)
+        free[name] = legal
+    return free
 
 
-def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | None, ...]:
-    """The dicts, with equal ones as one object."""
-    distinct: list[dict[str, Any]] = []
-    found: list[dict[str, Any] | None] = []
-    for given in dicts:
-        known = next((one for one in distinct if one == given), None)
-        if known is None and given is not None:
-            known = dict(given)
-            distinct.append(known)
-        found.append(known)
-    return tuple(found)
+def distinct(names: Sequence[Any], what: str) -> None:
+    """Raise ValueError if there is one twice."""
+    if len(set(names)) < len(names):
+        raise ValueError(f"two {what} have the same name")
+
+
+def variable_table(dimension: str, what: str, limits: bool = False) -> dict[str, Column]:
+    """The columns of `variable_columns`. The unit of limits is optional: there are files from before limits had one."""
+    along, units = (dimension,), f"see {dimension}_unit"
+    table = {
+        dimension: Column(along, TEXT, f"name of the {what}"),
+        f"{dimension}_lower": Column(along, NUMBER, f"lower bound of the {what}", units),
+        f"{dimension}_upper": Column(along, NUMBER, f"upper bound of the {what}", units),
+        f"{dimension}_scale": Column(along, NUMBER, f"scale of the {what}", units),
+        f"{dimension}_unit": Column(along, TEXT, f"unit of the {what}", optional=limits),
+    }
+    if not limits:
+        table[f"{dimension}_period"] = Column(along, NUMBER, f"period of the {what}, NaN if it is not periodic", units)
+    return table
+
+
+def variable_columns(variables: Sequence[Variable | Limit], dimension: str, limits: bool = False) -> dict[str, np.ndarray]:
+    """Names, bounds, scales and units along a dimension; of variables, periods too."""
+    columns = {
+        dimension: words([v.name for v in variables]),
+        f"{dimension}_lower": np.array([v.lower for v in variables], dtype=float),
+        f"{dimension}_upper": np.array([v.upper for v in variables], dtype=float),
+        f"{dimension}_scale": np.array([v.scale for v in variables], dtype=float),
+        f"{dimension}_unit": words([v.unit for v in variables]),
+    }
+    if not limits:
+        periods = [getattr(v, "period", None) for v in variables]
+        columns[f"{dimension}_period"] = np.array([np.nan if period is None else period for period in periods], dtype=float)
+    return columns
+
+
+def read_variables(data: Labelled, dimension: str) -> tuple[Variable, ...]:
+    """Variables from their `variable_columns`. Raises ValueError for bounds, a scale or a period that are none."""
+    rows = zip(read_limits(data, dimension), data[f"{dimension}_period"].tolist(), strict=True)
+    if not np.all(np.isnan(data[f"{dimension}_period"]) | (data[f"{dimension}_period"] > 0)):
+        raise ValueError(f"'{dimension}_period' has a period that is not above 0")
+    return tuple(Variable(v.name, v.lower, v.upper, v.unit, v.scale, None if np.isnan(period) else period) for v, period in rows)
+
+
+def read_limits(data: Labelled, dimension: str) -> tuple[Limit, ...]:
+    """Limits from their `variable_columns`. Raises ValueError for bounds or a scale that are none."""
+    names = data[dimension].tolist()
+    lower, upper, scale = (data[f"{dimension}_{key}"] for key in ("lower", "upper", "scale"))
+    for wrong, why in ((~(lower <= upper), "bounds that are no interval"), (~(scale > 0), "a scale that is not above 0")):
+        if wrong.any():
+            raise ValueError(f"the {dimension} '{names[int(np.argmax(wrong))]}' has {why}")
+    units = data[f"{dimension}_unit"].tolist() if f"{dimension}_unit" in data.arrays else [""] * len(names)
+    return tuple(Limit(*row) for row in zip(names, lower.tolist(), upper.tolist(), scale.tolist(), units, strict=True))
+
+
+def named_table(name: str, dimension: str, what: str, entry: str) -> dict[str, Column]:
+    """The columns of `named_columns`."""
+    return {
+        dimension: Column((dimension,), TEXT, f"name of the {entry}"),
+        name: Column(("point", dimension), NUMBER, what),
+        f"{name}_given": Column(("point", dimension), COUNT, f"1 where there is a number in {name}, else 0"),
+        f"{name}_known": Column(("point",), COUNT, f"1 for points that have {name}, else 0"),
+    }
+
+
+def named_columns(rows: Sequence[Mapping[str, float] | None], name: str, dimension: str) -> dict[str, np.ndarray]:
+    """Dicts of numbers as an array; which entries and which dicts there are."""
+    labels = list(dict.fromkeys(key for row in rows for key in row or {}))
+    values = np.array([[(row or {}).get(label, np.nan) for label in labels] for row in rows], dtype=float).reshape(len(rows), len(labels))
+    given = np.array([[label in (row or {}) for label in labels] for row in rows], dtype=np.int8).reshape(values.shape)
+    known = np.array([row is not None for row in rows], dtype=np.int8)
+    return {dimension: words(labels), name: values, f"{name}_given": given, f"{name}_known": known}
+
+
+def read_named(data: Labelled, name: str, dimension: str) -> list[dict[str, float] | None]:
+    """Dicts of numbers from their `named_columns`. Raises ValueError if a name is there twice."""
+    labels = data[dimension].tolist()
+    distinct(labels, f"entries of '{dimension}'")
+    values, given, known = (data[key].tolist() for key in (name, f"{name}_given", f"{name}_known"))
+    return [
+        {label: v for label, v, there in zip(labels, row, mask, strict=True) if there} if k else None
+        for row, mask, k in zip(values, given, known, strict=True)
+    ]
+
+
+def read_documents(texts: Iterable[str], what: str, fits: Callable[[Any], bool]) -> list[Any]:
+    """Values of JSON texts, equal texts once. Raises ValueError if one is no JSON, or its value does not fit."""
+    values: dict[str, Any] = {}
+    found = []
+    for text in texts:
+        if text not in values:
+            try:
+                values[text] = json.loads(text)
+            except (ValueError, RecursionError) as error:
+                raise ValueError(f"'{what}' is no JSON: {error}") from error
+            if not fits(values[text]):
+                raise ValueError(f"'{what}' is not what it should be: {text[:60]}")
+        found.append(values[text])
+    return found
+
+
+def read_attribute(attrs: Mapping[str, Any], name: str, kinds: type | tuple[type, ...]) -> Any:
+    """An attribute of a kind."""
+    if name not in attrs:
+        raise ValueError(f"the attribute '{name}' is missing from it")
+    if not isinstance(attrs[name], kinds):
+        raise ValueError(f"the attribute '{name}' is of another kind than it should be")
+    return attrs[name]
+
+
+def read_document(attrs: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """An attribute that is a JSON object."""
+    return read_documents([read_attribute(attrs, name, str)], name, lambda value: isinstance(value, dict))[0]
 
 
 def padded(rows: Sequence[np.ndarray | None], like: tuple[int, ...]) -> np.ndarray:
@@ -59,56 +197,3 @@ def padded(rows: Sequence[np.ndarray | None], like: tuple[int, ...]) -> np.ndarr
         if row is not None:
             padded[i][tuple(slice(length) for length in row.shape)] = row
     return padded
-
-
-@dataclass(frozen=True, eq=False)
-class Decisions:
-    """n decision vectors as one table, a column for each variable that any of them has."""
-
-    variables: tuple[Variable, ...]  # in the order of the first point, then those that only later ones have
-    values: np.ndarray  # (n, D): NaN where a point has no such variable
-    places: tuple[np.ndarray, ...]  # the columns that a point's own vector consists of, in its order
-
-    @classmethod
-    def of(cls, rows: Sequence[Any], variables: Sequence[Variable | Sequence[Variable]]) -> Decisions:
-        """From n vectors and their variables: one sequence for all of them, or one for each.
-
-        Raises ValueError if a vector has not as many entries as variables.
-        """
-        common = tuple(v for v in variables if isinstance(v, Variable))
-        each = [tuple(own) for own in variables if not isinstance(own, Variable)] or [common] * len(rows)
-        columns: dict[Variable, int] = {}
-        places = {own: np.array([columns.setdefault(v, len(columns)) for v in own], dtype=int) for own in dict.fromkeys([common, *each])}
-        values = np.full((len(rows), len(columns)), np.nan)
-        for i, (row, own) in enumerate(zip(rows, each, strict=True)):
-            if len(row) != len(own):
-                raise ValueError(f"decision {i} has {len(row)} entries, its variables are {len(own)}")
-            values[i, places[own]] = row
-        return cls.placed(tuple(columns), values, [places[own] for own in each])
-
-    @classmethod
-    def placed(cls, variables: tuple[Variable, ...], values: np.ndarray, places: Sequence[np.ndarray]) -> Decisions:
-        """From the parts; the arrays are made read-only."""
-        for array in (values, *places):
-            array.setflags(write=False)
-        return cls(variables, values, tuple(places))
-
-    def row(self, i: int) -> np.ndarray:
-        """The vector of point i, read-only."""
-        row = self.values[i, self.places[i]]
-        row.setflags(write=False)
-        return row
-
-    def variables_of(self, i: int) -> tuple[Variable, ...]:
-        """What its entries are."""
-        return tuple(self.variables[column] for column in self.places[i].tolist())
-
-    def take(self, rows: Sequence[int] | np.ndarray) -> Decisions:
-        """Some of the points, in the order given, without the variables that none of them has."""
-        places = [self.places[i] for i in rows]
-        used = np.zeros(len(self.variables), dtype=bool)
-        for place in places or [np.arange(len(used))]:
-            used[place] = True
-        column = np.cumsum(used) - 1
-        kept = tuple(v for v, keep in zip(self.variables, used.tolist(), strict=True) if keep)
-        return self.placed(kept, self.values[np.asarray(rows, dtype=int)][:, used], [column[place] for place in places])

@@ -15,9 +15,8 @@ from transcription.numerics.polynomials import BASES
 from transcription.trajectories.costates import Costates, PhaseCostates
 from transcription.trajectories.trajectory import PiecewisePolynomial
 
-from ..io.labelled import COUNT, NUMBER, TEXT, Column, legal_names
 from ..io.netcdf import Labelled, words
-from .columns import padded
+from .columns import COUNT, NUMBER, TEXT, Column, legal_names, padded
 
 MEANING = (
     "those of the sum of weights times objectives, all minimised; the weights (point, objective) in the root are not negative and of sum 1"

@@ -21,18 +21,20 @@ from problems.compiled import Objective
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 from transcription.numerics.polynomials import BASES
 
-from ..io.labelled import (
+from ..io.netcdf import Group, Labelled, words
+from ..io.text import document
+from .columns import (
     COUNT,
     NUMBER,
     TEXT,
     Column,
     checked,
     distinct,
-    document,
     labelled,
     legal_names,
     named_columns,
     named_table,
+    padded,
     read_attribute,
     read_document,
     read_documents,
@@ -42,8 +44,6 @@ from ..io.labelled import (
     variable_columns,
     variable_table,
 )
-from ..io.netcdf import Group, Labelled, words
-from .columns import padded
 from .costate_arrays import MEANING, costate_columns, costate_names, costate_table, of_phase, read_costates, whole
 from .points import Points
 from .provenance import read_source, read_stats, source_attributes, stats_attributes

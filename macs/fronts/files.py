@@ -21,8 +21,9 @@ import numpy as np
 
 from ..io import netcdf
 from ..io.atomic import check_target, read_whole, sealed, unsealed, write_whole
-from ..io.labelled import checked, document, read_attribute, read_document, variable_columns
 from ..io.netcdf import Group, Labelled, words
+from ..io.text import document
+from .columns import checked, read_attribute, read_document, variable_columns
 from .dataset import (
     CLOSEST,
     FORMAT,

@@ -15,7 +15,6 @@ from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.reevaluated import Reevaluation, reevaluation
-from .columns import number
 from .provenance import Source
 
 
@@ -238,10 +237,9 @@ class Point:
         costates : bool
             Whether costates and the Hamiltonian are drawn below, if there are any.
         """
-        from .pictures.design_plot import draw_designs
         from .pictures.flight_plot import draw_flight
-        from .pictures.kinds import hollow, remark
-        from .pictures.style import check_no_path, raised
+        from .pictures.front_plot import draw_designs
+        from .pictures.style import check_no_path, hollow, raised, remark
 
         check_no_path(figure, f"front[{self.index}].plot()[0]")
         said = remark(self)
@@ -275,9 +273,14 @@ class Point:
 
     def _repr_html_(self) -> str:
         """For notebooks: a table of the objectives and a small picture."""
-        from .pictures.notebook import point_html
+        from .pictures.flight_plot import point_html
 
         return point_html(self)
 
     def __repr__(self) -> str:
         return f"<Point {self.index}: {self.title}; violation {self.violation:.1e}, {self.status}>"
+
+
+def number(value: Any) -> float | None:
+    """The value as a float; None for None and for NaN."""
+    return None if value is None or np.isnan(value) else float(value)

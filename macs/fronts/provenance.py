@@ -20,7 +20,8 @@ from problems.vector import CompiledVectorProblem
 from problems.vector_problem import VectorProblem
 
 from ..evaluation.evaluator import Counts
-from ..io.labelled import document, read_attribute, read_document
+from ..io.text import document
+from .columns import read_attribute, read_document
 
 AnyCompiled = CompiledProblem | CompiledVectorProblem
 

@@ -13,7 +13,7 @@ import numpy as np
 from transcription.trajectories.costates import has_length
 
 from ..io.atomic import write_whole
-from .pictures.style import per
+from ..io.text import label, per
 
 
 def save_csv(front: Any, path: str | PathLike[str]) -> None:
@@ -83,7 +83,7 @@ def _write_table(path: str | PathLike[str], heads: Sequence[tuple[str, str]], ro
     """Write a table whose heads are names with units; numbers in full, empty cells for None and NaN."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in heads])
+    writer.writerow([label(*head) for head in heads])
     for row in rows:
         writer.writerow(["" if value is None or (isinstance(value, float) and np.isnan(value)) else value for value in row])
     write_whole(path, text.getvalue().encode())

@@ -1,4 +1,4 @@
-"""Tables of fronts as plain text."""
+"""Tables of fronts, as plain text and for notebooks."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from transcription.dfet.method import DFET
 from transcription.trajectories.constancy import hamiltonian_variation
 
 from ..evaluation.evaluator import CONVERGED
-from ..io.html import html_block, html_table
-from ..io.text import call, counted, duration, numbers, text_table
+from ..io.text import call, counted, duration, html_block, html_table, numbers, text_table
 from .verified import AGAIN, MISSES, constant_objectives, objective_scales
 
 if TYPE_CHECKING:

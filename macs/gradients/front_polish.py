@@ -24,13 +24,11 @@ from transcription.trajectories.simulate import simulate_all
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certified, vectors_points
-from ..fronts.merging import merge
+from ..fronts.builders import certified, from_vectors, merge
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..fronts.simulated import simulated
-from ..fronts.verified import unmarked
+from ..fronts.verified import simulated, unmarked
 from ..io.console import working
 from ..pareto.archive import Archive
 from ..pareto.dominance import nondominated
@@ -94,7 +92,7 @@ def polished(
         elapsed, stopped = interrupts.elapsed, interrupts.reason
     stats = more_costs(front.stats, evaluator.counts, elapsed, stopped)
     notes = [KEPT_INSIDE if inside else "" for inside in moved]
-    found = merge([vectors_points(nlp, Z, front.solver, stats, **found_of, notes=notes), known])
+    found = merge([from_vectors(nlp, Z, front.solver, stats, **found_of, notes=notes), known])
     found = found if len(found) <= limit else found[np.flatnonzero(spread(found.F, limit, guide=guide))]
     message = found.message if len(found) else f"no point violates less than {verify:g} when simulated"
     message = f"{stopped}: {unseen} points of the front before were not simulated" if unseen else message

@@ -1,8 +1,11 @@
-"""Plain text: tables, numbers, counts and durations."""
+"""Plain text, JSON and HTML: tables, numbers with their units, counts and durations."""
 
 from __future__ import annotations
 
+import json
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -64,3 +67,56 @@ def duration(seconds: float) -> str:
 
 def _decade(value: float) -> int:
     return int(np.floor(np.log10(value))) if value else 0
+
+
+def label(name: str, unit: str) -> str:
+    """Name of a column or a line: `name [unit]`."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def per(unit: str) -> str:
+    """Unit of what is per unit of something, such as a costate; empty if it has none."""
+    return f"per {unit}" if unit else ""
+
+
+def document(value: Any, strict: bool = False) -> str:
+    """JSON, numpy's numbers and arrays included. What is not data is written as its `repr`; if strict, it raises TypeError."""
+
+    def plain(item: Any) -> Any:
+        if isinstance(item, np.ndarray):
+            return item.tolist()
+        if isinstance(item, np.generic):
+            return item.item()
+        if strict:
+            raise TypeError(f"{type(item).__name__} is not data")
+        return repr(item)
+
+    return json.dumps(value, default=plain)
+
+
+CELL = "padding:1px 8px;white-space:nowrap;text-align:"
+
+
+# For notebooks. All words are escaped: names are the user's.
+
+
+def html_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[bool], dim: Sequence[int] = ()) -> str:
+    """A table."""
+    sides = ["left" if flush else "right" for flush in left]
+
+    def line(cells: Sequence[str], tag: str, style: str = "") -> str:
+        content = "".join(f'<{tag} style="{CELL}{side}">{escape(cell)}</{tag}>' for cell, side in zip(cells, sides, strict=True))
+        return f'<tr style="{style}">{content}</tr>' if style else f"<tr>{content}</tr>"
+
+    body = "".join(line(row, "td", "color:#888888" if i in dim else "") for i, row in enumerate(rows))
+    return f"<table><thead>{''.join(line(row, 'th') for row in headers)}</thead><tbody>{body}</tbody></table>"
+
+
+def html_block(title: str, table: str, notes: Sequence[str] = (), picture: bytes = b"", what: str = "") -> str:
+    """A title, a table, notes and a picture."""
+    lines = "".join(f"<div>{escape(note)}</div>" for note in notes)
+    image = ""
+    if picture:
+        source = b64encode(picture).decode("ascii")
+        image = f'<img alt="{escape(what, quote=True)}" style="max-width:100%" src="data:image/png;base64,{source}"/>'
+    return f"<div><div><b>{escape(title)}</b></div>{table}{lines}{image}</div>"

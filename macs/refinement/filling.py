@@ -9,8 +9,7 @@ from transcription.meshed import Meshed
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import vectors_points
-from ..fronts.merging import best_rows
+from ..fronts.builders import best_rows, from_vectors
 from ..fronts.points import Points
 from ..fronts.verified import Simulations, objective_scales, verified
 from ..gradients.scalarised import GradientSolves, Scalarised
@@ -101,6 +100,6 @@ def _solved(
     solved = task.solve(solves, nlp, point.decision)
     if solved.status != CONVERGED:
         return None
-    found = vectors_points(nlp, solved.z[None], points.solver, points.stats)
+    found = from_vectors(nlp, solved.z[None], points.solver, points.stats)
     found = verified(found, simulations.tolerance, task.weights, remark=False, simulations=simulations)
     return found if found.verified[0] else None

@@ -13,7 +13,7 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import certified, vectors_points
+from ..fronts.builders import certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..gradients.ends import moved_along
@@ -75,7 +75,7 @@ class _FineFront:
         """The front with the points that are done, and what they cost."""
         front, done = self.front, list(self.done)
         Z = np.array([self.done[i].z for i in done]).reshape(-1, len(self.nlp.variables))
-        found = vectors_points(self.nlp, Z, front.solver, front.stats, sort=False, **certified(self.nlp, Z, self.units))
+        found = from_vectors(self.nlp, Z, front.solver, front.stats, sort=False, **certified(self.nlp, Z, self.units))
         rows = [found[[done.index(i)]] if i in self.done else front[[i]] for i in range(len(front))]
         stats = more_costs(front.stats, self.solves.counts, 0.0, "")
         return Points.concatenate(rows).replace(solver=front.solver, stats=stats, message=front.message)

@@ -13,8 +13,7 @@ from transcription.meshes.verdict import Wanted
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import vectors_points
-from ..fronts.merging import best_rows
+from ..fronts.builders import best_rows, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, verified
@@ -210,7 +209,7 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: flo
         worse = ((nlp.evaluate(Z)[0] - points.F[own]) / scales).max(axis=1)
         points = points.replace(stats=more_costs(points.stats, evaluator.counts, 0.0, ""))
         for k in np.flatnonzero(feasible & changed & (worse <= loss)).tolist():
-            moved[own[k]] = vectors_points(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE])
+            moved[own[k]] = from_vectors(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE])
     if not moved:
         return points
     return Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats, solver=points.solver)

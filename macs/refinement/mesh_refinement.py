@@ -17,7 +17,7 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import certified, vectors_points
+from ..fronts.builders import certified, from_vectors
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
@@ -227,4 +227,4 @@ class FrontRefinement:
         nlp = self.loop.programs(best.method)
         found = certified(nlp, best.z[None], self.units) if best.by_gradients else {}
         about: dict[str, Any] = {**found, "notes": [note], "trajectories": [best.trajectory]}
-        return vectors_points(nlp, best.z[None], front.solver, front.stats, **about)
+        return from_vectors(nlp, best.z[None], front.solver, front.stats, **about)

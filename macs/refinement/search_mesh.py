@@ -17,7 +17,7 @@ from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
 
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certified, vectors_points
+from ..fronts.builders import certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.verified import verified
 from ..gradients.ends import lexicographic_ends
@@ -86,7 +86,7 @@ def found_mesh(problem: CompiledProblem, verify: float, tolerance: float, show: 
     solved = lexicographic_ends(solver)
     own = [k for k, one in enumerate(solved) if one.status == CONVERGED]
     Z = np.array([solved[k].z for k in own]).reshape(-1, len(nlp.variables))
-    ends = vectors_points(nlp, Z, {}, {"tolerance": tolerance}, sort=False, **certified(nlp, Z, None))
+    ends = from_vectors(nlp, Z, {}, {"tolerance": tolerance}, sort=False, **certified(nlp, Z, None))
     limits = PART * verify
     job = FrontRefinement(ends, Wanted(limits, feasible=limits, leaving=limits, objectives=limits), MESHES, knots=False)
     job.go(show)

@@ -20,7 +20,7 @@ from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..evaluation.linear_models import Samples
 from ..front import Front
-from ..fronts.merging import best_rows
+from ..fronts.builders import best_rows
 from ..gradients.front_polish import polished
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..pareto import directions

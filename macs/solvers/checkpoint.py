@@ -21,7 +21,7 @@ import numpy as np
 from ..evaluation.evaluator import Counts
 from ..fronts.provenance import versions
 from ..io.atomic import write_whole
-from ..io.labelled import document
+from ..io.text import document
 from . import checkpoint_file
 from .method import SearchMethod
 from .packing import pack, unpack

@@ -24,7 +24,7 @@ from ..evaluation.blackbox import BlackBox
 from ..evaluation.evaluator import Counts
 from ..evaluation.plain import plain_problem
 from ..front import Front
-from ..fronts.builders import no_points, trajectory_points, vector_points
+from ..fronts.builders import from_archive, from_vector_problem, no_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine, numbers_may_blow_up
@@ -214,7 +214,7 @@ class Solver(SearchMethod):
         def make_front(state: Any, stats: dict[str, Any]) -> Front:
             if state is None:
                 return Front.of(no_points(problem.goals, problem, about, stats | level))
-            return Front.of(trajectory_points(nlp, state.archive, state.closest, about, stats | level, certify=certified))
+            return Front.of(from_archive(nlp, state.archive, state.closest, about, stats | level, certify=certified))
 
         return SearchRun(
             self,
@@ -350,7 +350,7 @@ class Solver(SearchMethod):
             named = problem if problem.name else None
             if state is None:  # the function itself asked whether to end
                 return Front.of(no_points(() if box.m_known is None else box.goals, named, about, stats))
-            return Front.of(vector_points(problem, state.archive, state.closest, box.goals, about, stats))
+            return Front.of(from_vector_problem(problem, state.archive, state.closest, box.goals, about, stats))
 
         return SearchRun(
             self,

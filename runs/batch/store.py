@@ -33,8 +33,7 @@ from filelock import FileLock, Timeout
 from macs.front import Front
 from macs.fronts.files import LARGEST as LARGEST_FRONT
 from macs.io.atomic import read_whole, write_whole
-from macs.io.html import html_block, html_table
-from macs.io.text import duration, text_table
+from macs.io.text import duration, html_block, html_table, text_table
 
 from ..execution.samples import History
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, SimulationRecord, samples_path

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from macs.fronts.pictures.flight_plot import costate_ranges
-from macs.fronts.pictures.style import per
+from macs.io.text import per
 from problems.compiled import Limit, Variable
 from transcription.trajectories.costates import Costates, PhaseCostates, has_length
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory

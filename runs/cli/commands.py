@@ -13,13 +13,12 @@ import problems
 import transcription
 from macs.front import Front
 from macs.fronts.pictures.front_plot import save_front, save_picture
-from macs.fronts.pictures.style import label
 from macs.fronts.point import Point
 from macs.fronts.verification import Check
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target
 from macs.io.interrupts import Interrupts
-from macs.io.text import text_table
+from macs.io.text import label, text_table
 from macs.search.settings import MESHES
 from macs.solvers.catalogue import solver_class
 from macs.solvers.solver import Solver

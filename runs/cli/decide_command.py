@@ -17,9 +17,8 @@ from macs.decisions.choice import degree_text
 from macs.decisions.dialogue_file import is_dialogue, read
 from macs.front import Front
 from macs.fronts.pictures.front_plot import save_picture
-from macs.fronts.pictures.style import label
 from macs.io.atomic import check_target
-from macs.io.text import text_table
+from macs.io.text import label, text_table
 from problems import Problem
 from problems.catalogue import is_catalogued
 from problems.checks import unknown

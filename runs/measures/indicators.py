@@ -18,7 +18,7 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.pictures.style import label
+from macs.io.text import label
 from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
 

@@ -17,8 +17,8 @@ from msgspec import Meta
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.pictures.style import label
 from macs.io.atomic import read_whole
+from macs.io.text import label
 from macs.pareto.dominance import nondominated
 from problems.catalogue import CASES, address_of
 from problems.compiled import Objective

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from macs.front import Front
-from macs.fronts.columns import by_first
+from macs.fronts.points import by_first
 from macs.fronts.verified import feasible_when_simulated
 from macs.io.text import counted
 from macs.pareto.dominance import nondominated

@@ -11,11 +11,12 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.pictures.design_plot import draw_designs
 from macs.fronts.pictures.flight_plot import along
-from macs.fronts.pictures.style import blank_figure, label
+from macs.fronts.pictures.front_plot import draw_designs
+from macs.fronts.pictures.style import blank_figure
 from macs.fronts.point import Point
 from macs.gradient_tools import payoff
+from macs.io.text import label
 from macs.refinement.search_mesh import default_transcription
 from problems import load
 from transcription import SingleShooting, from_dict, word

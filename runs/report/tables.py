@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from macs.fronts.pictures.style import label
 from macs.io.atomic import write_whole
-from macs.io.text import text_table
+from macs.io.text import label, text_table
 
 COUNTED = 1e9
 """Whole numbers below are written in full."""

@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 
 from macs import MACS, Front, optimize, payoff, sweep
-from macs.fronts.builders import vectors_points
+from macs.fronts.builders import from_vectors
 from macs.io import console
 from macs.io.console import StatusLine, Steps, working
 from macs.io.interrupts import Interrupts
@@ -198,7 +198,7 @@ def stiff() -> Problem:
 def stiff_front() -> Front:
     nlp = DFET(20, 1).transcribe(stiff())
     Z = nlp.propagate(nlp.first_guess(np.full((2, len(nlp.free)), 0.5)))
-    return Front.of(vectors_points(nlp, Z, {"name": "nothing"}, {"tolerance": 1e-3}))
+    return Front.of(from_vectors(nlp, Z, {"name": "nothing"}, {"tolerance": 1e-3}))
 
 
 @pytest.fixture

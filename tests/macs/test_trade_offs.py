@@ -21,7 +21,7 @@ from macs.decisions import (
     trade_offs,
 )
 from macs.decisions.trade_offs import TradeOffs, rates
-from macs.fronts.builders import vectors_points
+from macs.fronts.builders import from_vectors
 from problems import Problem, load
 from problems.cases import goddard
 from problems.cases.skip_entry import smv
@@ -63,7 +63,7 @@ def optimum(problem: Problem, method: Transcription, time: float = 2.0, distance
 
 def as_front(nlp: NLP, z: np.ndarray) -> Front:
     """A vector as a front of one point, about which nothing else is known."""
-    return Front.of(vectors_points(nlp, z[None], {}, {"tolerance": 1e-6, "evaluations": 0, "gradient_solves": 1, "wall_time": 0.0}))
+    return Front.of(from_vectors(nlp, z[None], {}, {"tolerance": 1e-6, "evaluations": 0, "gradient_solves": 1, "wall_time": 0.0}))
 
 
 def exact_matrix(T: float, D: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Figure of one trajectory: states, controls and path constraints over time, then costates and the Hamiltonian."""
+"""Figures of trajectories: states, controls and path constraints over time, then costates and the Hamiltonian of one."""
 
 from __future__ import annotations
 
@@ -12,8 +12,23 @@ import numpy as np
 from problems.compiled import Limit, Variable
 from transcription.trajectories.costates import has_length
 
-from .limits import draw_limits
-from .style import COLORS, GREY, STYLE, axis_label, axis_number, new_figure, per, plain, wrapped
+from ...io.text import html_block, html_table, per
+from .style import (
+    COLORS,
+    GREY,
+    STYLE,
+    axis_label,
+    axis_number,
+    blank_figure,
+    draw_limits,
+    hollow,
+    new_figure,
+    plain,
+    raised,
+    remark,
+    rendered,
+    wrapped,
+)
 
 if TYPE_CHECKING:
     from transcription.trajectories.costates import Costates, PhaseCostates
@@ -263,3 +278,86 @@ def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, tr
         handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=plain(name)) for k, name in enumerate(names)]
         figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
     figure.suptitle(wrapped(plain(title), figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
+
+
+def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
+    """Axes, one for each state, control and path constraint, with the trajectories of some points over time.
+
+    Dashed lines are bounds and limits, as of one trajectory alone. A dot is the end of a phase that another one follows. Nodes are hollow
+    dots where a trajectory is not verified. Shorter trajectories are above longer ones. The legend has each point's number and objectives.
+    """
+    import matplotlib
+    from matplotlib.lines import Line2D
+
+    if not 1 <= len(points) <= len(COLORS):
+        raise ValueError(f"trajectories of one to {len(COLORS)} points can be told apart in a picture, not of {len(points)}")
+    without = [point.index for point in points if point.trajectory is None]
+    if without:
+        raise ValueError(f"point {without[0]} has no trajectory: its problem has none, or its evaluation failed")
+    drawn = [Drawn(point.trajectory, color, hollow(point)) for point, color in zip(points, COLORS, strict=False)]
+    over = sorted(drawn, key=lambda one: one.trajectory.phases[-1].tf, reverse=True)
+    panels = list(dict.fromkeys(panel for one in drawn for panel in quantities(one.trajectory)))
+    columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
+    rows = -(-len(panels) // columns)
+    size = (PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.4 + 0.2 * len(points))
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        if figure is None:
+            figure = new_figure(*size)
+        else:
+            figure.set_size_inches(*size)
+        grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+        for ax, (name, kind) in zip(grid, panels, strict=False):
+            draw_panel(ax, over, name, kind)
+        for ax in grid[len(panels) :]:
+            ax.remove()
+        for i, ax in enumerate(grid[: len(panels)]):
+            ax.tick_params(labelbottom=i + columns >= len(panels))
+        phases = [phase for one in drawn for phase in one.trajectory.phases]
+        first, last = min(phase.t0 for phase in phases), max(phase.tf for phase in phases)
+        margin = 0.015 * (last - first) or 1.0
+        grid[0].set_xlim(first - margin, last + margin)
+        figure.supxlabel(axis_label("time", " | ".join(dict.fromkeys(phase.time_unit for phase in phases))), fontsize=9)
+        figure.align_ylabels()
+        named = [wrapped(plain(_words(point)), figure.get_figwidth() - 0.6, 8.0) for point in points]
+        lines = [Line2D([], [], color=one.color, lw=1.5, label=words) for one, words in zip(drawn, named, strict=True)]
+        figure.legend(handles=lines, loc="outside upper left", frameon=False)
+    return grid[: len(panels)]
+
+
+def _words(point: Any) -> str:
+    """The point's number, its objectives, and whether it is not feasible, not verified or not simulated."""
+    named = zip(point.goals, point.objectives.values(), strict=True)
+    values = ", ".join(f"{goal.name} {value:.5g} {raised(goal.unit)}".rstrip() for goal, value in named)
+    said = remark(point)
+    return f"#{point.index}: {values}{f'; {said}' if said else ''}"
+
+
+# For notebooks
+
+
+PANELS = 24
+"""Most panels of a picture: a point with more is shown by its table alone."""
+
+
+def point_html(point: Any) -> str:
+    """HTML of a point: a row for each objective, as found and as simulated, and its states, controls and path constraints over time."""
+    simulated = point.simulated
+    heads = ["objective", "", "value", *(["simulated"] if simulated is not None else [])]
+    rows = [
+        [goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]", f"{value:.6g}", *([f"{simulated[goal.name]:.6g}"] if simulated else [])]
+        for goal, value in zip(point.goals, point.objectives.values(), strict=True)
+    ]
+    state = {None: "not simulated", True: "verified", False: "not verified"}[point.verified]
+    about = [f"{point.status}, {state}; violation {point.violation:.1e}"]
+    if point.parameters and point.trajectory is not None:
+        about.append("parameters: " + ", ".join(f"{name} {value:.6g}" for name, value in point.parameters.items()))
+    about += [point.note] if point.note else []
+    picture, figure = b"", blank_figure()
+    if point.trajectory is not None and len(quantities(point.trajectory)) <= PANELS:
+        draw_flight(point.trajectory, "", figure, hollow=hollow(point))
+        picture = rendered(figure, "png", 55)
+    elif not point.dynamic:
+        point.plot(figure)
+        picture = rendered(figure, "png", 55)
+    table = html_table([heads], rows, [True, True, *[False] * (len(heads) - 2)])
+    return html_block(f"Point {point.index}", table, about, picture, f"point {point.index}: {point.title}")

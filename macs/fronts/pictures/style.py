@@ -1,14 +1,21 @@
-"""Colours, fonts and labels of all figures."""
+"""Colours, fonts, labels, axes and kinds of points of all figures. matplotlib is imported only where one is drawn."""
 
 from __future__ import annotations
 
 import io
 import re
 import textwrap
+from collections.abc import Sequence
+from functools import cache
 from os import PathLike
 from typing import Any
 
+import numpy as np
+
 from problems.compiled import Objective
+
+from ...evaluation.evaluator import CONVERGED
+from ...io.text import label
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255")
 """Colours of Okabe and Ito, which readers with any colour vision can distinguish; wine red instead of black, which is for references."""
@@ -73,12 +80,33 @@ def _number_plainly(figure: Any) -> None:
     """Let new axes of a figure have plain numbers: matplotlib sets each as a formula, which takes long."""
     from matplotlib.ticker import ScalarFormatter
 
-    from .ticks import PlainNumbers
-
     for ax in figure.axes:
         for axis in (ax.xaxis, ax.yaxis):
             if type(axis.get_major_formatter()) is ScalarFormatter:
-                axis.set_major_formatter(PlainNumbers())
+                axis.set_major_formatter(_plain_formatter())
+
+
+def _plain_formatter() -> Any:
+    """A formatter of plain numbers; only a power of ten that they share, at the end of the axis, is a formula."""
+    return _formatter_class()(useMathText=False)
+
+
+@cache
+def _formatter_class() -> Any:
+    """Its class, which needs matplotlib to be imported."""
+    from matplotlib.ticker import ScalarFormatter
+
+    class PlainNumbers(ScalarFormatter):
+        def get_offset(self) -> str:
+            self.set_useMathText(True)
+            text = super().get_offset()
+            self.set_useMathText(False)
+            return text
+
+        def __reduce__(self) -> Any:
+            return _plain_formatter, (), self.__dict__
+
+    return PlainNumbers
 
 
 def rendered(figure: Any, suffix: str, dpi: float) -> bytes:
@@ -86,16 +114,6 @@ def rendered(figure: Any, suffix: str, dpi: float) -> bytes:
     picture = io.BytesIO()
     figure.savefig(picture, format=suffix, dpi=dpi)
     return picture.getvalue()
-
-
-def label(name: str, unit: str) -> str:
-    """Name of a column or a line: `name [unit]`."""
-    return f"{name} [{unit}]" if unit else name
-
-
-def per(unit: str) -> str:
-    """Unit of what is per unit of something, such as a costate; empty if it has none."""
-    return f"per {unit}" if unit else ""
 
 
 def check_no_path(given: Any, call: str) -> None:
@@ -154,3 +172,84 @@ def title_and_legend(ax: Any, title: str, columns: int = 3) -> None:
         pad = 72.0 * box.height / ax.figure.dpi + 4.0
     if title:
         ax.set_title(plain(title), loc="left", color=GREY, pad=pad)
+
+
+# Kinds of points
+
+
+NOT_VERIFIED, NOT_FEASIBLE, NOT_SIMULATED = "not verified", "not feasible", "not simulated"
+"""Words of legends."""
+
+
+def kinds(front: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Masks (n,) of the points that are drawn in full, of those that were simulated and are not verified, and of those not feasible."""
+    feasible = front.status == CONVERGED
+    apart = feasible & front.was_simulated & ~front.verified
+    return feasible & ~apart, apart, ~feasible
+
+
+def hollow(point: Any) -> bool:
+    """Whether a point is drawn hollow: it is not feasible, or was simulated and is not verified."""
+    return point.status != CONVERGED or point.verified is False
+
+
+def remark(point: Any) -> str:
+    """What a title says of a point: "not feasible", "not verified" or "not simulated"; empty if there is nothing to say."""
+    if point.status != CONVERGED:
+        return NOT_FEASIBLE
+    if point.verified is None:
+        return NOT_SIMULATED if point.trajectory is not None else ""
+    return "" if point.verified else NOT_VERIFIED
+
+
+# Vertical axes
+
+
+OF_SIZE, OF_BOUNDS = 1e-4, 1e-6
+"""A quantity is constant if it varies by less than this part of its size, or of the span of its bounds: the latter is round-off."""
+SMALL = 0.05
+"""Part of the span of its bounds below which a constant is not drawn within these, unless it is zero: it could not be read."""
+
+Limits = tuple[tuple[float, float] | None, float, float]
+"""Between which places across they hold (None: all), and the lower and upper limit; infinite where there is none."""
+
+
+def draw_limits(ax: Any, values: np.ndarray, limits: Sequence[Limits], reach: float = 1.0, margin: float = 0.06) -> None:
+    """Set the vertical range of axes and draw dashed lines at limits in it."""
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+    spans = [upper - lower for _, lower, upper in limits if np.isfinite(upper - lower)]
+    if is_constant(low, high, max(spans, default=0.0)):
+        low, high = _around(low, high, limits)
+        reach = 0.0
+    near = [
+        (across, bound)
+        for across, lower, upper in limits
+        for bound in dict.fromkeys((lower, upper))
+        if np.isfinite(bound) and low - reach * (high - low) <= bound <= high + reach * (high - low)
+    ]
+    for across, bound in near:
+        look: dict[str, Any] = {"color": GREY, "lw": 0.8, "ls": (0, (5, 3)), "zorder": 1}
+        if across is None:
+            ax.axhline(bound, **look)
+        else:
+            ax.plot(across, [bound, bound], **look)
+    ends = [low, high, *(bound for _, bound in near)]
+    room = margin * (max(ends) - min(ends))
+    ax.set_ylim(min(ends) - room, max(ends) + room)
+
+
+def is_constant(low: float, high: float, span: float) -> bool:
+    """Whether values between these are those of a constant whose bounds have this span (0: none)."""
+    return high - low <= max(OF_SIZE * max(abs(low), abs(high)), OF_BOUNDS * span)
+
+
+def _around(low: float, high: float, limits: Sequence[Limits]) -> tuple[float, float]:
+    """The range in which a constant is drawn."""
+    size = max(abs(low), abs(high))
+    both = [(lower, upper) for _, lower, upper in limits if np.isfinite(upper - lower) and lower < upper]
+    span = max((upper - lower for lower, upper in both), default=0.0)
+    if both and (size >= SMALL * span or size <= OF_BOUNDS * span):
+        return min(low, *(lower for lower, _ in both)), max(high, *(upper for _, upper in both))
+    half = 0.1 * size or 1.0
+    return low - half, high + half

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from macs import MACS, Front
-from macs.fronts.builders import vectors_points
+from macs.fronts.builders import from_vectors
 from macs.fronts.files import from_bytes, to_bytes
 from macs.solvers import checkpoint_file
 from problems import Problem, load
@@ -96,7 +96,7 @@ def front_of(points: int) -> Front:
     nlp = transcription.nlp(problem)
     X = Smooth().draw(problem, transcription, points, np.random.default_rng(0))
     Z = nlp.propagate(nlp.first_guess(X))
-    return Front.of(vectors_points(nlp, Z, {"name": "drawn", "settings": {}}, {"tolerance": 1e-6, "evaluations": points}))
+    return Front.of(from_vectors(nlp, Z, {"name": "drawn", "settings": {}}, {"tolerance": 1e-6, "evaluations": points}))
 
 
 def saving(points: int) -> Work:

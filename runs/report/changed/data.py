@@ -15,7 +15,7 @@ import numpy as np
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.pictures.style import COLORS, better
-from macs.fronts.simulated import check_alike
+from macs.fronts.verified import check_alike
 from problems.checks import unknown
 
 from ...files import errors_begin_with

@@ -25,11 +25,11 @@ import problems
 from macs import MACS
 from macs.front import Front
 from macs.fronts import files
+from macs.fronts.columns import legal_names
 from macs.fronts.dataset import ARRAYS, VERSION, _arrays, group_names
 from macs.fronts.point import Point
 from macs.fronts.provenance import Source
 from macs.io.atomic import sealed, unsealed
-from macs.io.labelled import legal_names
 from problems.compiled import Variable
 from transcription import DFET
 from transcription.trajectories.trajectory import Trajectory

@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from synthetic_fronts import black_box, empty, flights, marked, with_optional_phase
 
 from macs.fronts.pictures.flight_plot import _dense, draw_flight
-from macs.fronts.pictures.limits import draw_limits
-from macs.fronts.pictures.style import axis_label, axis_number, blank_figure
+from macs.fronts.pictures.style import axis_label, axis_number, blank_figure, draw_limits
 from problems.compiled import Objective, Variable
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from macs import Front
-from macs.fronts.merging import best_rows
+from macs.fronts.builders import best_rows
 from problems.compiled import Objective, Variable
 
 GOALS = (Objective("time"), Objective("height", sense="maximize"))

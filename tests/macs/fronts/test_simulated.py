@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from macs import NSGA2, Front
-from macs.fronts.builders import vectors_points
+from macs.fronts.builders import from_vectors
 from problems import Problem
 from transcription import DFET, SingleShooting
 
@@ -137,5 +137,5 @@ def test_controls_that_leave_their_bounds_between_nodes_are_seen():
     nlp = DFET(1, 2).transcribe(push())
     Z = nlp.propagate(nlp.first_guess(np.array([[2.0, 2.0, 1.0]])))
     some = {"status": ["converged"], "optimality": [None]}
-    front = Front.of(vectors_points(nlp, Z, {"name": "by hand"}, {"tolerance": 1e-6}, **some))
+    front = Front.of(from_vectors(nlp, Z, {"name": "by hand"}, {"tolerance": 1e-6}, **some))
     assert front.simulate(tolerance=1.0)[0].violations["bounds of run.u"] == pytest.approx(0.125 / 2.0, rel=1e-2)

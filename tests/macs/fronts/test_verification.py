@@ -9,7 +9,7 @@ from synthetic_fronts import black_box, flights
 
 import problems
 from macs import MACS, Front
-from macs.fronts.builders import vectors_points
+from macs.fronts.builders import from_vectors
 from macs.fronts.verification import verify
 from problems import Problem
 from transcription import DFET, parse
@@ -23,7 +23,7 @@ def front() -> Front:
     controls = nlp.lower[nlp.free] + np.random.default_rng(0).random((4, len(nlp.free))) * nlp.span[nlp.free]
     found = Projection().solve(nlp, controls)
     assert (found.status == "converged").all()
-    return Front.of(vectors_points(nlp, found.z, {"name": "by hand"}, {"tolerance": 1e-6}, optimality=[None] * 4))
+    return Front.of(from_vectors(nlp, found.z, {"name": "by hand"}, {"tolerance": 1e-6}, optimality=[None] * 4))
 
 
 def altered(front: Front, **changes) -> Front:
