@@ -38,7 +38,7 @@ from .gradients.ends import ENDS, METHODS, check_points, lexicographic_ends, sol
 from .gradients.multistart import MultistartSolver, MultistartStopping
 from .gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
 from .io.console import working
-from .pareto.ranges import BETTER, distinct
+from .pareto.dominance import BETTER, distinct
 from .refinement.found_optimum import COARSE, found_optimum
 from .refinement.guessed_mesh import guessed_elements
 from .refinement.mending import mended, solved_again

@@ -32,9 +32,8 @@ from pymoo.util.display.single import SingleObjectiveOutput
 from problems.checks import unknown
 from problems.vector import CompiledVectorProblem
 
-from .evaluation.blackbox import BlackBox
+from .evaluation.blackbox import BlackBox, plain_problem
 from .evaluation.evaluator import FAILED, Evaluation
-from .evaluation.plain import plain_problem
 from .search.macs import MACS as Search  # noqa: N811 - a class
 from .search.rounds import PLANNED, Rounds
 from .search.state import SearchState

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from macs.evaluation.blackbox import BlackBox
-from macs.evaluation.plain import plain_problem
+from macs.evaluation.blackbox import BlackBox, plain_problem
 
 
 def boxed(function: Any, bounds: Any = None, *, tolerance: float = 1e-6, **labels: Any) -> BlackBox:

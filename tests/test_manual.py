@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 from markdown_it import MarkdownIt
 
-from macs.solvers.catalogue import solver_class
+from macs.solvers.solver import solver_class
 from problems import names
 from runs import Study
 from runs.batch import file as studyfile

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from macs.decisions import dialogue_file
 from macs.fronts import files
-from macs.solvers import checkpoint_file
+from macs.solvers import checkpoint
 from problems import catalogue
 from runs.batch import file
 from runs.cli import inputs
@@ -29,7 +29,7 @@ def test_the_limits_that_it_names_are_those_of_the_code():
     assert found == {
         "fronts": files.LARGEST,
         "dialogues": dialogue_file.LARGEST,
-        "checkpoints": checkpoint_file.LARGEST,
+        "checkpoints": checkpoint.LARGEST,
         "tables": DATA_BYTES,
         "files": catalogue.LARGEST,
         "preferences": inputs.LARGEST,

@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..evaluation.box import Box
-from ..evaluation.evaluator import Evaluator
+from ..evaluation.evaluator import Box, Evaluator
 from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
 from .constraints import excess

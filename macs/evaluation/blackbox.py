@@ -1,14 +1,19 @@
-"""Evaluator of a black box: a vector problem, whether stated by name or made of a plain function."""
+"""Vector problems: made of plain functions or of pymoo problems, evaluated for a search, and evaluated again in the end."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
 import numpy as np
 
-from problems.compiled import Objective
-from problems.vector import CompiledVectorProblem
+from problems.checks import apart, check_text, shown
+from problems.compiled import CompiledProblem, Objective, Variable
+from problems.vector import CompiledVectorProblem, real_numbers
+from transcription.trajectories.limits import excess
 
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
-from .plain import default_goals, learned
 
 
 class BlackBox(Evaluator):
@@ -80,3 +85,253 @@ class BlackBox(Evaluator):
         F[failed], violation[failed] = np.nan, np.inf
         status = np.where(failed, FAILED, np.where(violation <= self.tolerance, CONVERGED, INFEASIBLE))
         return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status, residuals=residuals), 0
+
+
+SENSES = ("minimize", "maximize")
+
+Outputs = np.ndarray | tuple[np.ndarray, np.ndarray]
+
+
+def plain_problem(
+    function: Any,
+    bounds: Sequence | Mapping[str, Sequence[float]] | None = None,
+    *,
+    constraints: Callable[[np.ndarray], np.ndarray] | None = None,
+    names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
+    senses: Sequence[str] | None = None,
+    name: str = "",
+) -> CompiledVectorProblem:
+    """The vector problem of a plain vector function or a pymoo Problem.
+
+    Parameters
+    ----------
+    function : callable or pymoo Problem
+        `function(X: (n, d)) -> F: (n, m)` or `(F, G)`. A row with NaN or a masked value is a failed evaluation.
+    bounds : sequence of d pairs, pair of arrays (d,), or dict of pairs by name; None for a pymoo problem
+        Two sequences of more than two numbers each are (lower, upper); all else is a list of pairs.
+    constraints : callable, optional
+        `constraints(X: (n, d)) -> G: (n, c)`; G <= 0 is feasible. Its columns come after those of the function's own G.
+    names, units : sequences of m str, optional
+        Of the objectives. Default: "f1", "f2", ..., and no units.
+    senses : sequence of m of "minimize" or "maximize", optional
+        Default: all minimised.
+    name : str, optional
+        A front keeps it; without a name it does not say what it is of.
+
+    Returns
+    -------
+    CompiledVectorProblem
+        Its variables are called as the keys of `bounds`, else "x1", "x2", ...; its `goals` are empty if nothing says how many there are.
+
+    Raises
+    ------
+    ValueError
+        If an argument has the wrong type or shape; the message names it.
+    """
+    m: int | None = None
+    equalities: tuple[int, ...] = ()
+    if is_pymoo(function):
+        equalities = tuple(range(int(function.n_ieq_constr), int(function.n_ieq_constr + function.n_eq_constr)))
+        bounds = _pymoo_bounds(function) if bounds is None else bounds
+        m = int(function.n_obj)
+        function = PymooFunction(function)
+    if not callable(function):
+        raise ValueError(f"function: must be callable or a pymoo Problem, not {type(function).__name__}")
+    if constraints is not None and not callable(constraints):
+        raise ValueError(f"constraints: must be callable, not {type(constraints).__name__}")
+    labels = {"names": _labels("names", names), "units": _labels("units", units), "senses": _labels("senses", senses)}
+    for sense in labels["senses"] or ():
+        if sense not in SENSES:
+            raise ValueError(f"senses: must be 'minimize' or 'maximize', not {sense!r}")
+    given = labels["names"]
+    if given and len(set(given)) < len(given):
+        raise ValueError(f"names: {', '.join(given)} has a name twice")
+    for key, words in labels.items():
+        if words is not None:
+            m = learned(m, len(words), f"{key} has {len(words)}")
+    variables, lower, upper = read_bounds(bounds)
+    sides = zip(variables, lower.tolist(), upper.tolist(), strict=True)
+    return CompiledVectorProblem(
+        name=name,
+        variables=tuple(Variable(one, low, high, "", high - low) for one, low, high in sides),
+        goals=() if m is None else default_goals(m, labels["names"], labels["units"], labels["senses"]),
+        limits=None,
+        rows=PlainRows(function, constraints),
+        equalities=equalities,
+    )
+
+
+def default_goals(
+    m: int, names: Sequence[str] | None = None, units: Sequence[str] | None = None, senses: Sequence[str] | None = None
+) -> tuple[Objective, ...]:
+    """m objectives: "f1", "f2", ..., without units and minimised, unless said otherwise."""
+    words = names or [f"f{k + 1}" for k in range(m)], units or [""] * m, senses or [SENSES[0]] * m
+    return tuple(Objective(*those) for those in zip(*words, strict=True))
+
+
+def learned(known: int | None, count: int, source: str) -> int:
+    """The number of objectives from `source`. Raises ValueError if it is known to be another."""
+    if count < 1 or (known is not None and known != count):
+        raise ValueError(f"objectives: {source}, {known or 'at least 1'} expected")
+    return count
+
+
+@dataclass(frozen=True)
+class PlainRows:
+    """A plain function, with constraints of its own or apart, as `problems.vector.Rows`."""
+
+    function: Callable[[np.ndarray], Outputs]
+    constraints: Callable[[np.ndarray], np.ndarray] | None
+
+    def __call__(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        given = X.copy()  # the function may change its own
+        outputs = self.function(X)
+        F, G = outputs if isinstance(outputs, tuple) and len(outputs) == 2 else (outputs, None)
+        values = _rows("function: the objectives", F, len(X))
+        columns = [] if G is None else [_rows("function: the constraints", G, len(X))]
+        if self.constraints is not None:
+            columns.append(_rows("constraints: what it returned", self.constraints(given), len(X)))
+        return values, np.hstack([np.empty((len(X), 0)), *columns])
+
+
+def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+    """Names (d,), lower and upper bounds (d,) from a sequence of pairs, a pair of sequences longer than two, or a dict of pairs by name."""
+    if bounds is None:
+        raise ValueError("bounds: missing")
+    names = tuple(str(name) for name in bounds) if isinstance(bounds, Mapping) else None
+    for name in names or ():
+        check_text(name, "bounds: the name of a variable")
+    try:
+        pairs = list(bounds.values() if isinstance(bounds, Mapping) else bounds)
+    except TypeError:
+        raise ValueError(f"bounds: pairs (lower, upper) expected, or a mapping of them by name, not {shown(bounds)}") from None
+    if not pairs:
+        raise ValueError("bounds: empty")
+    if names is None and len(pairs) == 2 and all(np.ndim(side) == 1 and len(side) > 2 for side in pairs):
+        if len(pairs[0]) != len(pairs[1]):
+            raise ValueError(f"bounds: {len(pairs[0])} lower and {len(pairs[1])} upper ones")
+        pairs = list(zip(*pairs, strict=True))
+    names = names or tuple(f"x{i + 1}" for i in range(len(pairs)))
+    limits = np.empty((len(pairs), 2))
+    for i, (name, pair) in enumerate(zip(names, pairs, strict=True)):
+        try:
+            limits[i] = np.asarray(pair, dtype=float).reshape(2)
+        except (TypeError, ValueError):
+            raise ValueError(f"bounds: variable '{name}' has {pair!r}, a pair (lower, upper) expected") from None
+        lower, upper = limits[i]
+        if not (np.isfinite(lower) and np.isfinite(upper) and np.isfinite(upper - lower)):
+            raise ValueError(f"bounds: variable '{name}' has ({lower:g}, {upper:g}), finite numbers expected")
+        if lower >= upper:
+            raise ValueError(f"bounds: variable '{name}' has lower {lower:g} >= upper {upper:g}")
+        if not apart(lower, upper):
+            raise ValueError(f"bounds: variable '{name}' has ({float(lower)!r}, {float(upper)!r}), which leave nothing to decide")
+    return names, limits[:, 0].copy(), limits[:, 1].copy()
+
+
+def _labels(name: str, labels: Sequence[str] | None) -> tuple[str, ...] | None:
+    """The labels as a tuple; a single string is refused."""
+    if labels is None:
+        return None
+    if isinstance(labels, str) or not all(isinstance(label, str) for label in labels):
+        raise ValueError(f"{name}: must be a sequence of strings, one for each objective, not {labels!r}")
+    for label in labels:
+        check_text(label, f"{name}: one")
+    return tuple(labels)
+
+
+def _rows(what: str, values: Any, count: int) -> np.ndarray:
+    """Copy (count, k) of the values that a user's function returned for `count` points; (count,) counts as one column."""
+    try:
+        array = real_numbers(values)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} must be an array of real numbers, not {shown(values)}") from None
+    if array.shape == (count,):
+        array = array[:, None]
+    if array.ndim != 2 or len(array) != count:
+        raise ValueError(f"{what} have shape {array.shape} for {count} points, ({count}, k) expected")
+    return array
+
+
+def is_pymoo(problem: Any) -> bool:
+    """Whether this is a pymoo Problem, by its attributes, without importing pymoo."""
+    return all(hasattr(problem, name) for name in ("n_var", "n_obj", "xl", "xu", "evaluate"))
+
+
+def _pymoo_bounds(problem: Any) -> list[tuple[float, float]]:
+    """Pairs of bounds of a pymoo Problem with real variables."""
+    lower, upper = problem.xl, problem.xu
+    if lower is None or upper is None or isinstance(lower, dict):
+        raise ValueError(f"bounds: pymoo problem {type(problem).__name__} has no bounds of real variables")
+    lower, upper = np.broadcast_to(lower, problem.n_var), np.broadcast_to(upper, problem.n_var)
+    return list(zip(lower.tolist(), upper.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class PymooFunction:
+    """A pymoo Problem, vectorised or elementwise, as function that returns (F, G); the last columns of G are its equality constraints."""
+
+    problem: Any
+
+    def __call__(self, X: np.ndarray) -> Outputs:
+        out = self.problem.evaluate(X, return_values_of=["F", "G", "H"], return_as_dictionary=True)
+        columns = [out[key] for key in ("G", "H") if out.get(key) is not None and np.size(out[key])]
+        return (out["F"], np.hstack(columns)) if columns else out["F"]
+
+
+@dataclass(frozen=True)
+class Reevaluation:
+    """One point evaluated again; with the names of a `Simulation`."""
+
+    objectives: Mapping[str, float]  # by name, in the user's units and senses
+    violations: Mapping[str, float]  # scaled residual by constraint, and of bounds that are exceeded
+    violation: float  # the largest of them; infinite if the evaluation failed
+    # defect, max_defect, trajectory: Empty, 0 and None: there are no states.
+    defect: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    max_defect: float = 0.0
+    trajectory: Any = None
+
+
+def evaluated_again(problem: CompiledVectorProblem, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[dict[str, float]]]:
+    """Objectives (n, m), all minimised, largest violations (n,), and violations by name of decisions (n, d), those of bounds included.
+
+    A failed evaluation has NaN and infinity. Constraints without names are called g1, g2, ...
+    """
+    if not len(Z):
+        return np.empty((0, len(problem.goals))), np.empty(0), []
+    F, found = problem.evaluate(np.array(Z, dtype=float))
+    beyond = excess(np.asarray(Z, dtype=float)[:, None], problem.variables)
+    limits = [f"g{k + 1}" for k in range(found.shape[1])] if problem.limits is None else [limit.name for limit in problem.limits]
+    names = [*limits, *(f"bounds of {v.name}" for v in problem.variables)]
+    amounts = np.hstack([np.abs(found), beyond])
+    failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(found).all(axis=1))
+    F = np.where(failed[:, None], np.nan, F)
+    violations = [
+        {name: float(amount) for k, (name, amount) in enumerate(zip(names, row, strict=True)) if k < len(limits) or amount > 0.0}
+        for row in amounts
+    ]
+    return F, np.where(failed, np.inf, amounts.max(axis=1, initial=0.0)), violations
+
+
+def reevaluation(problem: CompiledVectorProblem, z: np.ndarray) -> Reevaluation:
+    """One decision (d,) evaluated again."""
+    F, violation, violations = evaluated_again(problem, z[None])
+    objectives = {goal.name: float(goal.sign * value) for goal, value in zip(problem.goals, F[0], strict=True)}
+    return Reevaluation(objectives, violations[0], float(violation[0]))
+
+
+def check_same_vectors(known: CompiledVectorProblem, other: CompiledVectorProblem | CompiledProblem) -> CompiledVectorProblem:
+    """`other`, if decisions of the known problem can be evaluated with it. Raises ValueError for other variables or objectives."""
+    place = f"points of '{known.name}' cannot be evaluated with '{other.name}'"
+    if not isinstance(other, CompiledVectorProblem):
+        raise ValueError(f"{place}: that is no vector problem")
+
+    def parts(problem: CompiledVectorProblem) -> dict[str, list[str]]:
+        objectives = [f"{goal.sense} {goal.name} [{goal.unit}]" for goal in problem.goals]
+        return {"variables": [v.name for v in problem.variables], "objectives": objectives}
+
+    ours, theirs = parts(known), parts(other)
+    for what, names in ours.items():
+        if theirs[what] != names:
+            raise ValueError(f"{place}: its {what} are {', '.join(theirs[what])}, not {', '.join(names)}")
+    return other

@@ -12,7 +12,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from .box import Box
+from .evaluator import Box
 
 MEMORY = 500
 """Most points that are kept, the last ones."""

@@ -14,7 +14,7 @@ from transcription.trajectories.costates import Costates
 from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.reevaluated import Reevaluation, reevaluation
+from ..evaluation.blackbox import Reevaluation, reevaluation
 from .provenance import Source
 
 

@@ -21,8 +21,8 @@ from transcription.base import NLP, Transcription
 from transcription.trajectories.simulate import simulate, worst_violation
 from transcription.trajectories.trajectory import PhaseTrajectory
 
+from ..evaluation.blackbox import evaluated_again
 from ..evaluation.evaluator import CONVERGED
-from ..evaluation.reevaluated import evaluated_again
 from .point import Point
 from .points import Points
 from .verified import missed, objective_scales

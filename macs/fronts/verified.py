@@ -16,9 +16,9 @@ from transcription.trajectories.limits import excess
 from transcription.trajectories.simulate import Simulation, simulate_all, simulate_elements, worst_violation
 from transcription.trajectories.trajectory import Trajectory
 
+from ..evaluation.blackbox import check_same_vectors, evaluated_again
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
-from ..evaluation.reevaluated import check_same_vectors, evaluated_again
-from ..pareto.ranges import CONSTANT, objective_units, stated_scales
+from ..pareto.dominance import CONSTANT, objective_units, stated_scales
 from .points import Points
 from .provenance import AnyCompiled
 

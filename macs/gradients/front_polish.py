@@ -31,9 +31,8 @@ from ..fronts.provenance import more_costs
 from ..fronts.verified import simulated, unmarked
 from ..io.console import working
 from ..pareto.archive import Archive
-from ..pareto.dominance import nondominated
-from ..pareto.energy import Guide, spread
-from ..pareto.ranges import ranges
+from ..pareto.dominance import nondominated, ranges
+from ..pareto.spread import Guide, spread
 from .polish import BudgetedSolves, polish
 
 KEPT_INSIDE = "kept inside its limits, so that it is feasible when simulated"

@@ -13,9 +13,8 @@ import numpy as np
 from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
 from ..pareto.archive import Archive
 from ..pareto.directions import across, divisions_below, simplex_lattice
-from ..pareto.dominance import CURVE, among, extremes
-from ..pareto.energy import Guide, reach, spread
-from ..pareto.ranges import BETTER, distinct, feasible_and_no_worse, nearest, ranges, slack
+from ..pareto.dominance import BETTER, CURVE, among, distinct, extremes, feasible_and_no_worse, nearest, ranges, slack
+from ..pareto.spread import Guide, reach, spread
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,8 @@ import numpy as np
 
 from ..io.text import counted
 from .dominance import CURVE, among, dominates, nondominated, worthwhile
-from .energy import Guide, best_of_each, of_low_energy, pair_energies, reach, spread
 from .niches import MANY, best_of_niches
-from .volume import duels
+from .spread import Guide, best_of_each, duels, of_low_energy, pair_energies, reach, spread
 
 
 @dataclass(frozen=True, repr=False)

@@ -8,8 +8,8 @@ from math import comb
 
 import numpy as np
 
-from .energy import spread
-from .ranges import normalised
+from .dominance import normalised
+from .spread import spread
 
 
 def across(y: np.ndarray) -> np.ndarray:

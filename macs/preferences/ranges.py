@@ -13,8 +13,7 @@ from problems.compiled import Objective
 
 from ..evaluation.evaluator import CONVERGED
 from ..fronts.points import Points
-from ..pareto.dominance import nondominated
-from ..pareto.ranges import SAME
+from ..pareto.dominance import SAME, nondominated
 
 PAYOFF = "payoff"
 """The solver of a payoff table."""

@@ -14,7 +14,7 @@ from ..fronts.points import Points
 from ..fronts.verified import Simulations, objective_scales, verified
 from ..gradients.scalarised import GradientSolves, Scalarised
 from ..pareto.dominance import extremes
-from ..pareto.energy import Guide, spread
+from ..pareto.spread import Guide, spread
 from .mesh_loop import Programs
 
 STARTS = 2

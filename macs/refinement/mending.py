@@ -20,7 +20,7 @@ from ..fronts.verified import Simulations, accuracy, largest_miss, objective_sca
 from ..gradients.front_polish import KEPT_INSIDE, back_off
 from ..gradients.scalarised import WORK, GradientSolves
 from ..io.console import working
-from ..pareto.energy import Guide
+from ..pareto.spread import Guide
 from .filling import filled
 from .fine_front import solved_on
 from .mesh_loop import OnMesh, Programs

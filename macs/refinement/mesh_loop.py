@@ -23,7 +23,7 @@ from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised, Start, best_of
-from ..pareto.ranges import objective_units, stated_scales
+from ..pareto.dominance import objective_units, stated_scales
 
 KEPT = 3
 """Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""

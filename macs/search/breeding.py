@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..evaluation.box import Box
+from ..evaluation.evaluator import Box
 from ..pareto.dominance import CURVE
 from ..pareto.niches import MANY
 from .state import remember

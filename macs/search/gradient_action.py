@@ -10,9 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..evaluation.evaluator import Evaluation, Evaluator
-from ..pareto.dominance import CURVE
-from ..pareto.energy import Guide
-from ..pareto.ranges import feasible_and_no_worse, nearest, ranges
+from ..pareto.dominance import CURVE, feasible_and_no_worse, nearest, ranges
+from ..pareto.spread import Guide
 from . import social
 from .state import NO_DIRECTION, SearchState
 

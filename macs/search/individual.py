@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..evaluation.box import Box
+from ..evaluation.evaluator import Box
 from ..pareto.dominance import CURVE
 from .breeding import FEW, mates
 from .state import SearchState

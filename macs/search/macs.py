@@ -26,7 +26,7 @@ from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..pareto import directions
 from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
-from ..pareto.energy import Guide, spread
+from ..pareto.spread import Guide, spread
 from ..refinement.mending import mended
 from ..refinement.search_mesh import Chosen
 from ..solvers.solver import Solver

@@ -17,8 +17,7 @@ from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_bet
 from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, alpha_of, guessed_start
 from ..gradients.scalarised import GradientSolves, Scalarised
 from ..pareto.archive import Archive
-from ..pareto.dominance import extremes
-from ..pareto.ranges import ranges
+from ..pareto.dominance import extremes, ranges
 
 FIRST = 10
 """Most points of the front that gradient solves find before the search begins."""

@@ -14,9 +14,8 @@ import numpy as np
 
 from ..gradients.scalarised import WORK
 from ..pareto.directions import tchebycheff
-from ..pareto.dominance import nondominated
-from ..pareto.ranges import distinct, ranges
-from ..pareto.volume import dominated_volume
+from ..pareto.dominance import distinct, nondominated, ranges
+from ..pareto.spread import dominated_volume
 
 PLANNED = 2_000
 """Settings that follow from a number of evaluations are those of this one."""

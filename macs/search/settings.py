@@ -162,7 +162,7 @@ class Settings:
     exponent : float, optional
         Power of the distance in the energy that spreads the archive, in [1, 16]. Default: 2, as in the paper, with two objectives, and 8
         with three: on a surface, a low power drives the points to the edges. By default a point also takes the place of the nearest one
-        if it adds more to the dominated volume, see `macs.pareto.volume`; with a power given, and with `prefer`, energy alone decides. With
+        if it adds more to the dominated volume, see `macs.pareto.spread`; with a power given, and with `prefer`, energy alone decides. With
         more than three objectives the default is no energy: the archive has the best points near evenly spread directions, see
         `macs.pareto.niches`, unless there is a preference.
     ceiling : int, default 100 000

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..evaluation.box import Box
+from ..evaluation.evaluator import Box
 from ..pareto import directions
-from ..pareto.energy import Guide, spread
-from ..pareto.ranges import normalised
+from ..pareto.dominance import normalised
+from ..pareto.spread import Guide, spread
 from .settings import Settings
 from .state import NO_DIRECTION, SearchState
 from .trials import Trials

@@ -1,18 +1,27 @@
 """Keeps a run in a file, so that the same call continues it, whatever ended it.
 
-The document of the file says which run it is, by which versions it was computed, and how it stands, in the trees of `packing`.
+The first line of a file is `MACS checkpoint 6: N bytes, sha256 H`; N and H are those of the npz archive that follows, of arrays and a JSON
+document. So a file that was damaged is refused before any of it is unpacked. Of a forged one, no array is allocated before its size is
+known to be that of its bytes. Nothing is pickled. The document says which run it is, by which versions it was computed, and how it stands,
+in the trees of `packing`.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import logging
 import math
+import re
+import stat
 import time
+import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, is_dataclass
 from os import PathLike
+from pathlib import Path
 from types import TracebackType
 from typing import Any, get_type_hints
 
@@ -22,7 +31,6 @@ from ..evaluation.evaluator import Counts
 from ..fronts.provenance import versions
 from ..io.atomic import write_whole
 from ..io.text import document
-from . import checkpoint_file
 from .method import SearchMethod
 from .packing import pack, unpack
 from .shapes import check_shapes
@@ -93,7 +101,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 
     def _read(self, seed: int | None) -> tuple[Any, Kept]:
         """As `read`; the message of a ValueError continues after the name of the file."""
-        header, arrays = checkpoint_file.read(self.path)
+        header, arrays = read_file(self.path)
         if not isinstance(header, dict) or header.keys() != {*PARTS} or not isinstance(header["belongs"], dict):
             raise ValueError(f"is no valid checkpoint: its document does not consist of {', '.join(PARTS)}")
         try:
@@ -144,7 +152,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         began = time.perf_counter()
         try:
             header = {"belongs": self._belongs, "versions": self._versions, **trees}
-            write_whole(self.path, checkpoint_file.to_bytes(header, arrays))
+            write_whole(self.path, to_bytes(header, arrays))
         except OSError as error:
             if not self.failure:
                 log.warning("checkpoint: %s; the search goes on without", error.strerror or error)
@@ -219,3 +227,83 @@ def _differences(theirs: Any, mine: Any, name: str = "") -> Iterator[str]:
 def _short(value: Any) -> str:
     text = "nothing" if value is None else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+VERSION = 6
+FIRST_LINE = re.compile(rb"MACS checkpoint (\d{1,9}): (\d{1,18}) bytes, sha256 ([0-9a-f]{64})\n")
+LONGEST_LINE = 200
+LARGEST = 2**32
+"""Bytes that the archive of a file may have."""
+DOCUMENT = "document"
+"""The member of the archive that is JSON, as an array of bytes."""
+
+
+def to_bytes(document: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> bytes:
+    """The content of a file with a document (what JSON knows, infinities and NaN included) and named arrays, none of objects."""
+    buffer = io.BytesIO()
+    members: dict[str, Any] = {DOCUMENT: np.frombuffer(json.dumps(document).encode(), dtype=np.uint8), **arrays}
+    np.savez(buffer, **members)
+    archive = buffer.getvalue()
+    return f"MACS checkpoint {VERSION}: {len(archive)} bytes, sha256 {hashlib.sha256(archive).hexdigest()}\n".encode() + archive
+
+
+def read_file(path: str | PathLike[str]) -> tuple[Any, dict[str, np.ndarray]]:
+    """The document and the arrays of a file, checked against its checksum."""
+    if not stat.S_ISREG(Path(path).stat().st_mode):
+        raise ValueError("is no ordinary file")  # reading a device or a pipe may never end
+    with Path(path).open("rb") as file:
+        line = file.readline(LONGEST_LINE)
+        head = FIRST_LINE.fullmatch(line)
+        if head is None and line.startswith(b"MACS checkpoint"):
+            raise ValueError("is damaged: its first line is not that of a checkpoint")
+        if head is None:
+            raise ValueError(f"is no checkpoint: {'it is a file of something else, or of an older MACS' if line else 'it is empty'}")
+        version, size, checksum = int(head[1]), int(head[2]), head[3].decode()
+        if version != VERSION:
+            raise ValueError(f"is a checkpoint of version {version}; this MACS reads version {VERSION}")
+        found = Path(path).stat().st_size - len(line)
+        if found != size:
+            raise ValueError(f"is damaged: it should have {size} bytes after its first line, but has {found}")
+        if size > LARGEST:
+            raise ValueError(f"is no valid checkpoint: it has {size} bytes, more than {LARGEST}")
+        archive = file.read(size)
+    if hashlib.sha256(archive).hexdigest() != checksum:
+        raise ValueError("is damaged: its content does not match its checksum")
+    return _from_archive(archive)
+
+
+def _from_archive(archive: bytes) -> tuple[Any, dict[str, np.ndarray]]:
+    arrays = {name.removesuffix(".npy"): _array(name, content) for name, content in _members(archive).items()}
+    if DOCUMENT not in arrays:
+        raise ValueError("is no valid checkpoint: it has no document")
+    try:
+        return json.loads(arrays.pop(DOCUMENT).tobytes()), arrays
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"is no valid checkpoint: its document is no JSON ({error})") from error
+
+
+def _members(archive: bytes) -> dict[str, bytes]:
+    """The members of a zip archive, which have to be stored as they are: then none is larger than the archive."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(archive)) as file:
+            infos = file.infolist()
+            stored = all(info.compress_type == zipfile.ZIP_STORED for info in infos)
+            if not stored or sum(info.file_size for info in infos) > len(archive):
+                raise ValueError("its members are compressed, or overlap")
+            return {info.filename: file.read(info) for info in infos}
+    except Exception as error:  # zipfile raises errors of many classes; whichever it is, the archive is not one that `to_bytes` wrote
+        raise ValueError(f"is no valid checkpoint: its archive cannot be read ({error})") from error
+
+
+def _array(name: str, content: bytes) -> np.ndarray:
+    """An array of the content of an npy file. Only the header is parsed by numpy, which would allocate what the header asks for."""
+    stream = io.BytesIO(content)
+    try:
+        np.lib.format.read_magic(stream)
+        shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
+        start = stream.tell()
+        if dtype.hasobject or not dtype.itemsize or math.prod(shape) * dtype.itemsize != len(content) - start:
+            raise ValueError(f"its {len(content) - start} bytes are no array {shape} of {dtype}")
+        return np.ndarray(shape, dtype, content, start, order="F" if fortran else "C").copy(order="K")
+    except Exception as error:  # as above: the parser of numpy raises errors of many classes
+        raise ValueError(f"is no valid checkpoint: {name.removesuffix('.npy')} is no array ({error})") from error

@@ -1,7 +1,9 @@
-"""Solvers: search methods that a user calls to find the Pareto front of an optimal control problem or a plain function."""
+"""Solvers: search methods that a user calls for the Pareto front of a problem or of a plain function, and solvers by name."""
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -10,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from problems.checks import unknown
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from problems.vector import CompiledVectorProblem, without_dynamics
@@ -20,9 +23,8 @@ from transcription.smooth import Smooth
 from transcription.stopping import Stopped
 
 from ..evaluation.bilevel import Bilevel
-from ..evaluation.blackbox import BlackBox
+from ..evaluation.blackbox import BlackBox, plain_problem
 from ..evaluation.evaluator import Counts
-from ..evaluation.plain import plain_problem
 from ..front import Front
 from ..fronts.builders import from_archive, from_vector_problem, no_points
 from ..fronts.provenance import costs, more_costs
@@ -369,3 +371,49 @@ def _not_simulated(front: Front, error: Exception) -> Front:
     log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
     failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
     return front.replace(message="; ".join(filter(None, [front.message, failed])))
+
+
+SOLVERS: dict[str, str] = {
+    "macs": "macs.search.macs:MACS",
+    "nsga2": "macs.baselines.nsga2:NSGA2",
+    "nsga3": "macs.baselines.nsga3:NSGA3",
+    "moead": "macs.baselines.moead:MOEAD",
+    "mopso": "macs.baselines.mopso:MOPSO",
+    "mopsocd": "macs.baselines.mopsocd:MOPSOCD",
+    "smsemoa": "macs.baselines.smsemoa:SMSEMOA",
+    "agemoea2": "macs.baselines.agemoea2:AGEMOEA2",
+    "rvea": "macs.baselines.rvea:RVEA",
+    "ctaea": "macs.baselines.ctaea:CTAEA",
+    "decide": "macs.decision_solver:Decide",
+    "optimum": "macs.gradient_solvers:Optimum",
+    "payoff": "macs.gradient_solvers:Payoff",
+    "sweep": "macs.gradient_solvers:Sweep",
+}
+"""Module and class of each solver, imported only when needed."""
+PAPER = "paper"
+"""In a study file, `{solver = "macs", paper = true}`: the settings of the paper. Also the name of the method of a class that has them."""
+
+
+def solver_class(name: str) -> type[Solver]:
+    """The class of a solver by its name. Raises ValueError, with the known names, for an unknown name."""
+    place = SOLVERS.get(name.lower())
+    if place is None:
+        raise ValueError(unknown("solver", name, SOLVERS))
+    module, _, item = place.partition(":")
+    return getattr(importlib.import_module(module), item)
+
+
+def solver(name: str, **settings: Any) -> Solver:
+    """A solver by name, with its settings; with `paper=True` those of its paper, where it has them (`MACS.paper`), but for those given."""
+    kind = solver_class(name)
+    known = inspect.signature(kind).parameters
+    paper = settings.pop(PAPER, False)
+    if paper not in (True, False):
+        raise ValueError(f"solver '{name}': {PAPER} must be true or false, not {paper!r}")
+    as_published = getattr(kind, PAPER, None)
+    if paper and as_published is None:
+        raise ValueError(f"solver '{name}' has no settings of a paper")
+    for key in settings:
+        if key not in known:
+            raise ValueError(unknown(f"setting of solver '{name}'", key, known))
+    return as_published(**settings) if paper and as_published else kind(**settings)

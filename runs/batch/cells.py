@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from macs.evaluation.plain import PymooFunction, is_pymoo, plain_problem
+from macs.evaluation.blackbox import PymooFunction, is_pymoo, plain_problem
 from macs.io.text import call
 from macs.refinement.search_mesh import default_transcription
 from macs.search.rounds import PLANNED
-from macs.solvers import catalogue
-from macs.solvers.solver import Solver
+from macs.solvers.solver import Solver, solver
 from problems import Problem, VectorProblem, load
 from problems.checks import check_count
 from problems.compiled import CompiledProblem
@@ -213,7 +212,7 @@ def _solver(label: str, given: Any) -> Solver:
     if not isinstance(name, str):
         raise ValueError(f"solvers: '{label}' must be a name, a Solver, or a table with its name as solver = \"macs\", not {given!r}")
     with errors_begin_with("solvers"):
-        return catalogue.solver(name, **settings)
+        return solver(name, **settings)
 
 
 def _budgets(given: Any, problems: Mapping[str, Statement]) -> dict[str, int | None]:

@@ -14,7 +14,7 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.pareto.directions import simplex_lattice
 from macs.preferences import Preference, Ranges, ReferencePoint, WeightedSum
-from macs.search.region import PART, Region
+from macs.search.guide import PART, Region
 from problems import load
 from problems.cases import goddard
 from problems.compiled import Objective

@@ -10,7 +10,7 @@ import numpy as np
 from macs import MACS, Front, sweep
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
-from macs.pareto.energy import spread
+from macs.pareto.spread import spread
 from macs.refinement.search_mesh import default_transcription
 from problems import Problem, load
 from problems.cases import goddard, landing_site, orbit_rise

@@ -20,8 +20,7 @@ from macs.io.atomic import check_target
 from macs.io.interrupts import Interrupts
 from macs.io.text import label, text_table
 from macs.search.settings import MESHES
-from macs.solvers.catalogue import solver_class
-from macs.solvers.solver import Solver
+from macs.solvers.solver import Solver, solver_class
 from problems.catalogue import is_catalogued
 from problems.checks import unknown
 from transcription.inner import NAMED

@@ -10,7 +10,7 @@ import moocore
 import numpy as np
 
 from macs.preferences import Preference
-from macs.search.region import Region
+from macs.search.guide import Region
 from problems.compiled import Objective
 
 from .indicators import Points, extent, minimised, truth

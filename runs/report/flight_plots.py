@@ -14,7 +14,7 @@ from macs.front import Front
 from macs.fronts.pictures.flight_plot import along, quantities
 from macs.fronts.pictures.style import COLORS, axis_label, title_and_legend
 from macs.fronts.point import Point
-from macs.pareto.energy import spread
+from macs.pareto.spread import spread
 
 from ..measures.indicators import normalised
 from .plots import COLUMN, PAGE, new_figure, style

@@ -10,7 +10,7 @@ from macs import Front
 from macs.decision_solver import Decide
 from macs.decisions import FuzzyGoal, FuzzySatisfactory, WeightedSum
 from macs.gradient_solvers import Payoff
-from macs.solvers.catalogue import solver
+from macs.solvers.solver import solver
 
 BOTH = {"effort": 1.0, "time": 1.0}
 GOALS = {"method": "FuzzySatisfactory", "settings": {"targets": {}, "priorities": ["time", "effort"]}}

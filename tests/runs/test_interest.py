@@ -5,7 +5,7 @@ import pytest
 from choices import plain_front
 
 from macs.preferences import PhysicalProgramming, ReferencePoint, Smaller
-from macs.search.region import PART
+from macs.search.guide import PART
 from problems.compiled import Objective
 from runs.measures.interest import Interest
 

@@ -11,7 +11,7 @@ from macs import MACS, Front, sweep
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.pareto.dominance import nondominated
-from macs.pareto.energy import spread
+from macs.pareto.spread import spread
 from problems import Problem
 from transcription import Transcription, parse
 from transcription.stopping import stopped_by

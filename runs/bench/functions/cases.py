@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from macs import AGEMOEA2, CTAEA, MACS, MOEAD, NSGA2, NSGA3, RVEA, SMSEMOA, Solver
-from macs.evaluation.plain import plain_problem
+from macs.evaluation.blackbox import plain_problem
 from macs.pareto.directions import simplex_lattice
 from problems.vector import CompiledVectorProblem
 

@@ -13,7 +13,7 @@ import numpy as np
 from macs import MACS, Front
 from macs.fronts.builders import from_vectors
 from macs.fronts.files import from_bytes, to_bytes
-from macs.solvers import checkpoint_file
+from macs.solvers import checkpoint
 from problems import Problem, load
 from transcription import Smooth, parse
 from transcription.base import NLP
@@ -129,13 +129,13 @@ def keeping(agents: int) -> Work:
 
     def begun(path: Path) -> tuple[object, dict[str, np.ndarray]]:
         solver.minimize(two_goals, [(0.0, 1.0)] * WIDTH, evaluations=agents, seed=1, checkpoint=path)
-        return checkpoint_file.read(path)
+        return checkpoint.read_file(path)
 
     header, arrays = in_folder(begun)
 
     def again(path: Path) -> object:
-        path.write_bytes(checkpoint_file.to_bytes(header, arrays))
-        return checkpoint_file.read(path)
+        path.write_bytes(checkpoint.to_bytes(header, arrays))
+        return checkpoint.read_file(path)
 
     return lambda: in_folder(again)
 

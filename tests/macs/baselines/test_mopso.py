@@ -13,10 +13,9 @@ from plain import zdt
 
 from macs import MOPSO, MOPSOCD
 from macs.baselines.mopso import hypercubes, improved, inertia, moved, roulette, thin_out, velocities
-from macs.evaluation.box import Box
-from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
+from macs.evaluation.evaluator import Box, Counts, Evaluation, Evaluator
 from macs.pareto.dominance import nondominated
-from macs.solvers.catalogue import solver
+from macs.solvers.solver import solver
 
 PLAIN = Box(np.zeros(2), np.ones(2), np.zeros(2, dtype=bool))
 ROUND = Box(np.zeros(2), np.ones(2), np.array([True, False]))

@@ -12,7 +12,7 @@ from fronts import mean_distance
 from plain import dtlz, zdt
 
 from macs import AGEMOEA2, CTAEA, RVEA, SMSEMOA
-from macs.solvers.catalogue import solver, solver_class
+from macs.solvers.solver import solver, solver_class
 
 CUBE = [(-2.0, 2.0)] * 3
 

@@ -4,7 +4,7 @@ from boxes import boxed
 from pymoo.core.problem import ElementwiseProblem
 from pymoo.problems import get_problem
 
-from macs.evaluation.plain import read_bounds
+from macs.evaluation.blackbox import read_bounds
 
 
 def two(X):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs.evaluation import linear_models
-from macs.evaluation.box import Box
+from macs.evaluation.evaluator import Box
 from macs.evaluation.linear_models import BEYOND, MEMORY, Samples, steps_to_zero
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -9,7 +9,7 @@ from carts import MESH, cart, constant, points, slowed
 from synthetic_fronts import black_box
 
 from macs import MACS, NSGA2, optimize
-from macs.evaluation.plain import plain_problem
+from macs.evaluation.blackbox import plain_problem
 from macs.fronts import verified as module
 from macs.fronts.verified import COARSEST, FINEST, VERIFY, Simulations, accuracy, largest_miss, objective_scales, verified
 from problems import Problem

@@ -15,8 +15,7 @@ from macs.gradients.polish import BudgetedSolves, _ends, _helped_by_neighbours, 
 from macs.pareto.archive import Archive
 from macs.preferences import ReferencePoint
 from macs.search.gradient_action import allowed
-from macs.search.guide import PreferenceGuide
-from macs.search.region import Region
+from macs.search.guide import PreferenceGuide, Region
 from macs.search.state import SearchState
 from problems import Problem, load
 from problems.cases import goddard, orbit_rise

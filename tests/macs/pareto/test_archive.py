@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from macs.pareto.archive import Archive, insert, least_violated, outside
 from macs.pareto.dominance import dominates, extremes
-from macs.pareto.energy import pair_energies, reach, spread
+from macs.pareto.spread import pair_energies, reach, spread
 
 
 def empty(m):

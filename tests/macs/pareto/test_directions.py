@@ -19,7 +19,7 @@ from macs.pareto.directions import (
     simplex_lattice,
     tchebycheff,
 )
-from macs.pareto.ranges import normalised
+from macs.pareto.dominance import normalised
 
 
 @given(st.integers(1, 6), st.integers(1, 300))

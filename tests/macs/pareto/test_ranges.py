@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs.evaluation.evaluator import CONVERGED, INFEASIBLE, Evaluation
-from macs.pareto.ranges import distinct, feasible_and_no_worse, nearest, normalised, ranges, slack
+from macs.pareto.dominance import distinct, feasible_and_no_worse, nearest, normalised, ranges, slack
 
 
 def results(F: list[list[float]], status: str = CONVERGED) -> Evaluation:

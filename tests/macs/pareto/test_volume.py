@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 
 from macs.pareto.archive import Archive, insert
 from macs.pareto.dominance import extremes, nondominated
-from macs.pareto.energy import pair_energies, reach, spread
-from macs.pareto.volume import CORNER, dominated_volume, duels
+from macs.pareto.spread import CORNER, dominated_volume, duels, pair_energies, reach, spread
 
 
 def fought(F, chosen, fixed=()):

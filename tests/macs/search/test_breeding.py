@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pymoo.core.problem import Problem
 from pymoo.problems import get_problem
 
-from macs.evaluation.box import Box
+from macs.evaluation.evaluator import Box
 from macs.search import breeding
 from macs.search.individual import individual_actions
 from macs.search.macs import MACS

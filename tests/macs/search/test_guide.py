@@ -25,9 +25,8 @@ from macs.decisions import (
     WeightedSum,
 )
 from macs.pareto import directions
-from macs.pareto.energy import spread
-from macs.search.guide import OUTSIDE, PreferenceGuide
-from macs.search.region import PART, Region
+from macs.pareto.spread import spread
+from macs.search.guide import OUTSIDE, PART, PreferenceGuide, Region
 from problems import load
 from problems.cases import goddard
 from problems.compiled import Objective

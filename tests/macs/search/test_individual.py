@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.evaluation.box import Box
+from macs.evaluation.evaluator import Box
 from macs.pareto.directions import pair_up
 from macs.search.individual import (
     SHORTEST,

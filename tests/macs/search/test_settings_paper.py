@@ -8,7 +8,7 @@ from boxes import boxed
 
 from macs.evaluation.evaluator import Evaluation
 from macs.pareto.archive import Archive
-from macs.pareto.energy import pair_energies
+from macs.pareto.spread import pair_energies
 from macs.search.individual import individual_actions
 from macs.search.macs import MACS
 from macs.search.social import assign, social_actions

@@ -27,8 +27,8 @@ from macs import CTAEA, MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA
 from macs.evaluation import bilevel
 from macs.gradients import polish
 from macs.io import interrupts as monitor
-from macs.solvers import checkpoint, checkpoint_file
-from macs.solvers.checkpoint_file import to_bytes
+from macs.solvers import checkpoint
+from macs.solvers.checkpoint import to_bytes
 from macs.solvers.solver import Solver
 from transcription import DFET
 from transcription.inner import Ipopt
@@ -530,8 +530,7 @@ def test_pickles_are_never_opened(file) -> None:
     np.savez(file.with_suffix(".npz"), document=np.array([Mine()], dtype=object))
     archive = file.with_suffix(".npz").read_bytes()
     file.write_bytes(
-        f"MACS checkpoint {checkpoint_file.VERSION}: {len(archive)} bytes, sha256 {hashlib.sha256(archive).hexdigest()}\n".encode()
-        + archive
+        f"MACS checkpoint {checkpoint.VERSION}: {len(archive)} bytes, sha256 {hashlib.sha256(archive).hexdigest()}\n".encode() + archive
     )
     with pytest.raises(ValueError, match="is no valid checkpoint: document is no array"):
         minimize(checkpoint=file)
@@ -592,7 +591,7 @@ FORGED = {
 def test_a_forged_file_is_refused_by_the_name_of_the_field(file, kind) -> None:
     change, message = FORGED[kind]
     minimize(checkpoint=file, callback=after(2))
-    header, arrays = checkpoint_file.read(file)
+    header, arrays = checkpoint.read_file(file)
     change(header, arrays)
     file.write_bytes(to_bytes(header, arrays))
     counted = Counted()

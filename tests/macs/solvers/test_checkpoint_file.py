@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from macs import MACS
-from macs.solvers import checkpoint_file
-from macs.solvers.checkpoint_file import VERSION, read, to_bytes
+from macs.solvers import checkpoint
+from macs.solvers.checkpoint import VERSION, read_file, to_bytes
 
 DOCUMENT = {"numbers": [1, 2.5, float("inf")], "word": "é"}
 ARRAYS = {"state.Z": np.arange(600.0).reshape(20, 30), "state.status": np.array(["converged", "failed"]), "state.empty": np.zeros((0, 3))}
@@ -63,7 +63,7 @@ def same_array(one: np.ndarray, two: np.ndarray) -> bool:
 def test_what_is_written_is_read(file) -> None:
     arrays = ARRAYS | {"state.F": np.asfortranarray(np.arange(6.0).reshape(2, 3)), "state.one": np.array(1 + 2j)}
     file.write_bytes(to_bytes(DOCUMENT, arrays))
-    found = read(file)
+    found = read_file(file)
     assert same(found, (DOCUMENT, arrays))
     assert found[1]["state.F"].flags.f_contiguous and all(array.flags.writeable and array.flags.owndata for array in found[1].values())
 
@@ -122,7 +122,7 @@ def test_damage_is_refused_in_one_line(file, monkeypatch, damage: Callable[[byte
 
     minimize(lambda X: np.stack([X[:, 0], 1 - X.sum(axis=1)], axis=1))
     content, rng = file.read_bytes(), np.random.default_rng(1)
-    monkeypatch.setattr(checkpoint_file, "_from_archive", lambda archive: pytest.fail("unpacked"))
+    monkeypatch.setattr(checkpoint, "_from_archive", lambda archive: pytest.fail("unpacked"))
     for broken in (damage(content, rng) for _ in range(30)):
         if broken != content:  # a block of zeros may be overwritten by zeros
             file.write_bytes(broken)
@@ -150,7 +150,7 @@ def test_damage_is_refused_in_one_line(file, monkeypatch, damage: Callable[[byte
 def test_what_is_wrong_is_said(file, content, message) -> None:
     file.write_bytes(content)
     with pytest.raises(ValueError, match=f"^{message}"):
-        read(file)
+        read_file(file)
 
 
 # Forged files
@@ -189,7 +189,7 @@ def test_a_forged_file_is_refused_before_it_takes_memory(file, kind) -> None:
     tracemalloc.start()
     try:
         with pytest.raises(ValueError, match=f"^is no valid checkpoint: {message}"):
-            read(file)
+            read_file(file)
         assert tracemalloc.get_traced_memory()[1] < 2e7
     finally:
         tracemalloc.stop()
@@ -206,7 +206,7 @@ def test_members_that_overlap_are_refused(file) -> None:
     assert len(entries) == end - start
     file.write_bytes(sealed(archive[:start] + entries + archive[end:]))
     with pytest.raises(ValueError, match=r"its archive cannot be read \(its members are compressed, or overlap\)$"):
-        read(file)
+        read_file(file)
 
 
 # Paths that are no files
@@ -224,7 +224,7 @@ def test_what_is_no_ordinary_file_is_refused_at_once(tmp_path, kind) -> None:
     else:
         path.symlink_to(path)
     with pytest.raises((ValueError, OSError), match=r"is no ordinary file|symbolic links"):
-        read(path)
+        read_file(path)
     with pytest.raises(
         (ValueError, OSError), match=r"run.ckpt'.*(it is no ordinary file|it is a folder|its symbolic links lead in a circle)"
     ):
@@ -237,7 +237,7 @@ def test_a_huge_file_is_not_read(file) -> None:
             opened.write(content)
             opened.truncate(10**12)  # sparse: it takes no room on the disk
         with pytest.raises(ValueError, match=r"is damaged|is no checkpoint"):
-            read(file)
+            read_file(file)
 
 
 def test_a_huge_file_that_states_its_size_is_not_read(file) -> None:
@@ -246,4 +246,4 @@ def test_a_huge_file_that_states_its_size_is_not_read(file) -> None:
         opened.write(line)
         opened.truncate(len(line) + 10**12)
     with pytest.raises(ValueError, match=r"it has 1000000000000 bytes, more than 4294967296"):
-        read(file)
+        read_file(file)

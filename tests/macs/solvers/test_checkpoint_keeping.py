@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from macs.evaluation.evaluator import Counts
-from macs.solvers import checkpoint, checkpoint_file
+from macs.solvers import checkpoint
 from macs.solvers.checkpoint import SECONDS, SHARE, Checkpoint, Kept, Unreadable, keeps
 
 
@@ -81,9 +81,9 @@ def written(path: Path, what: State | None = None, how: Kept | None = None, belo
 def forged(path: Path, change: Callable[[dict[str, Any], dict[str, np.ndarray]], Any]) -> None:
     """A valid file with another content."""
     written(path)
-    header, arrays = checkpoint_file.read(path)
+    header, arrays = checkpoint.read_file(path)
     change(header, arrays)
-    path.write_bytes(checkpoint_file.to_bytes(header, arrays))
+    path.write_bytes(checkpoint.to_bytes(header, arrays))
 
 
 class Clock:
@@ -131,7 +131,7 @@ def test_a_file_that_cannot_be_read_says_why(path: Path, monkeypatch: pytest.Mon
     def fails(path: Path) -> None:
         raise error
 
-    monkeypatch.setattr(checkpoint_file, "read", fails)
+    monkeypatch.setattr(checkpoint, "read_file", fails)
     with pytest.raises(Unreadable, match=f"^checkpoint '.*run.ckpt' cannot be read: {reason}$"):
         made(path).read(None)
 
@@ -311,7 +311,7 @@ def test_long_values_are_cut_to_sixty_characters(path: Path, size: int) -> None:
     ids=str,
 )
 def test_a_document_of_other_parts_is_no_checkpoint(path: Path, header: Any) -> None:
-    path.write_bytes(checkpoint_file.to_bytes(header, {}))
+    path.write_bytes(checkpoint.to_bytes(header, {}))
     with pytest.raises(
         Unreadable, match="' is no valid checkpoint: its document does not consist of belongs, versions, run, state; it was left"
     ):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from macs import payoff, sweep
-from macs.solvers.catalogue import solver
 from macs.solvers.checkpoint import keeps
+from macs.solvers.solver import solver
 from problems import load
 from runs.cli import main
 from transcription import parse

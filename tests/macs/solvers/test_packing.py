@@ -16,7 +16,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from macs.solvers import checkpoint_file
+from macs.solvers import checkpoint
 from macs.solvers.packing import BIT_GENERATORS, pack, unpack
 
 
@@ -110,8 +110,8 @@ def through_file(value: Any, kind: Any) -> Any:
     tree = pack(value, kind, arrays, "state")
     with TemporaryDirectory() as folder:
         file = Path(folder) / "run.ckpt"
-        file.write_bytes(checkpoint_file.to_bytes({"state": tree}, arrays))
-        document, arrays = checkpoint_file.read(file)
+        file.write_bytes(checkpoint.to_bytes({"state": tree}, arrays))
+        document, arrays = checkpoint.read_file(file)
     value = unpack(document["state"], kind, arrays, "state")
     assert not arrays
     return value
