@@ -1,13 +1,6 @@
 """Other multi-objective algorithms as solvers, with the same evaluations, counts and seeds: those of pymoo, and a MOPSO."""
 
-from .agemoea2 import AGEMOEA2
-from .ctaea import CTAEA
-from .moead import MOEAD
-from .mopso import MOPSO
-from .mopsocd import MOPSOCD
-from .nsga2 import NSGA2
-from .nsga3 import NSGA3
-from .rvea import RVEA
-from .smsemoa import SMSEMOA
+from .algorithms import AGEMOEA2, CTAEA, MOEAD, NSGA2, NSGA3, RVEA, SMSEMOA
+from .swarms import MOPSO, MOPSOCD
 
 __all__ = ["AGEMOEA2", "CTAEA", "MOEAD", "MOPSO", "MOPSOCD", "NSGA2", "NSGA3", "RVEA", "SMSEMOA"]

@@ -13,7 +13,7 @@ import numpy as np
 HANDLINGS = ("feasible-first", "penalty", "objective")
 
 
-HUGE = 1e30
+BEYOND_ALL = 1e30
 """Larger than any objective; its square is still finite."""
 
 
@@ -75,12 +75,12 @@ def by_objectives(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
     dominate more violated ones, and are better in any Tchebycheff or boundary-intersection scalarisation.
     """
     share = np.divide(cv, 1.0 + cv, out=np.ones_like(cv), where=np.isfinite(cv))
-    return np.where((cv > 0.0)[:, None], HUGE * (1.0 + share)[:, None], F)
+    return np.where((cv > 0.0)[:, None], BEYOND_ALL * (1.0 + share)[:, None], F)
 
 
 def _finite(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
     """F with a finite number, which is not used, where the evaluation failed."""
-    return np.where(np.isfinite(cv)[:, None], F, HUGE)
+    return np.where(np.isfinite(cv)[:, None], F, BEYOND_ALL)
 
 
 def total(v: np.ndarray) -> np.ndarray:

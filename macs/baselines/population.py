@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 import numpy as np
@@ -56,19 +56,43 @@ class State:
             self.closest = least_violated(self.closest, seen.Z, seen.F, seen.violation)
 
 
+@dataclass(frozen=True, kw_only=True)
 class PopulationSolver(Solver):
-    """Solver with a population, and with `handling`, `penalty` and `degree` among its settings.
+    """Solver with a population.
 
     `stats["population"]` of its fronts has the number of `generations`, the first population included; the `size` of the last population,
     and how many of its members were `feasible`, and of these `nondominated`; and the first generation with one feasible member,
     `first_feasible`, and with all members feasible, `all_feasible` (None if there was none).
     """
 
-    handling: str
-    penalty: float
-    degree: str
-    _compares_violations = True
+    handling: str = "feasible-first"
+    penalty: float = 1000.0
+    degree: str = "largest"
+
+    RANGES: ClassVar[Mapping[str, int | str]] = {
+        **dict.fromkeys(("population", "neighbors"), 2),
+        **dict.fromkeys(("particles", "archive", "cells", "divisions"), 1),
+        **dict.fromkeys(("crossover", "neighbor_mating", "search"), "[0, 1]"),
+        **dict.fromkeys(("max_velocity", "adapt_every"), "(0, 1]"),
+        **dict.fromkeys(("crossover_eta", "mutation_eta"), "[1, 100]"),
+        **dict.fromkeys(("penalty", "alpha", "inertia", "final_inertia", "cognitive", "social", "settled"), "[0, inf)"),
+    }
+    """Of all settings of all solvers that are numbers: the least value of a count, the interval of others."""
+    COMPARES_VIOLATIONS: ClassVar[bool] = True
     """Whether the algorithm compares violations itself; otherwise they are included in the objectives presented to it."""
+
+    def __post_init__(self) -> None:
+        kind = type(self).__name__
+        for setting in fields(self):
+            name, value, allowed = f"{kind}: {setting.name}", getattr(self, setting.name), self.RANGES.get(setting.name)
+            if isinstance(allowed, int) and not (value is None and setting.default is None):
+                check_count(name, value, allowed)
+            elif isinstance(allowed, str):
+                check_interval(name, value, allowed)
+            elif isinstance(setting.default, bool) and not isinstance(value, bool | np.bool_):
+                raise ValueError(f"{name} must be True or False, not {value!r}")
+        check_choice(f"{kind}: handling", self.handling, constraints.HANDLINGS)
+        check_choice(f"{kind}: degree", self.degree, constraints.DEGREES)
 
     def extra_stats(self, state: State, evaluator: Evaluator) -> dict[str, Any]:
         """See `SearchMethod.extra_stats`."""
@@ -88,7 +112,7 @@ class PopulationSolver(Solver):
     def _presented(self, points: Members, tolerance: float) -> constraints.Presented:
         """Objectives and violations of points as presented to the algorithm."""
         F, cv = constraints.presented(self.handling, self.penalty, points.F, points.violation, tolerance, points.degree)
-        return (F, cv) if self._compares_violations else (constraints.by_objectives(F, cv), np.zeros(len(cv)))
+        return (F, cv) if self.COMPARES_VIOLATIONS else (constraints.by_objectives(F, cv), np.zeros(len(cv)))
 
     def _presented_count(self, m: int) -> int:
         """Number of objectives as presented to the algorithm, for a problem with m."""
@@ -105,20 +129,6 @@ class PopulationSolver(Solver):
             Z[: len(given)] = given
         Z[:, evaluator.free] = evaluator.box.confine(Z[:, evaluator.free])
         return Z
-
-    def _check(self, counts: Mapping[str, int], intervals: Mapping[str, str], flags: Sequence[str] = ()) -> None:
-        """Raise ValueError for settings outside their ranges: least values of `counts`, intervals of numbers, and flags."""
-        name = type(self).__name__
-        for setting, least in counts.items():
-            if getattr(self, setting) is not None or getattr(type(self), setting) is not None:  # None only where that is the default
-                check_count(f"{name}: {setting}", getattr(self, setting), least)
-        for setting, interval in {**intervals, "penalty": "[0, inf)"}.items():
-            check_interval(f"{name}: {setting}", getattr(self, setting), interval)
-        for setting in flags:
-            if not isinstance(getattr(self, setting), bool | np.bool_):
-                raise ValueError(f"{name}: {setting} must be True or False, not {getattr(self, setting)!r}")
-        check_choice(f"{name}: handling", self.handling, constraints.HANDLINGS)
-        check_choice(f"{name}: degree", self.degree, constraints.DEGREES)
 
 
 def distinct(start: np.ndarray | None) -> np.ndarray:

@@ -10,15 +10,19 @@ from __future__ import annotations
 import warnings
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Archive
+from ..pareto.directions import check_several
 from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
 
 
+@dataclass(frozen=True)
 class Baseline(PopulationSolver):
     """Solver that runs an algorithm of pymoo.
 
@@ -34,28 +38,43 @@ class Baseline(PopulationSolver):
     - Points of a `start` are the first members of the population; if they are too many, evenly spaced ones are used.
     - Periodic variables are treated as plain intervals.
 
-    An implementation is a frozen dataclass of settings, those of a `PopulationSolver` included, with the hooks below.
+    An implementation is a frozen dataclass of settings, those of a `PopulationSolver` included, with the class of pymoo, its arguments, and
+    the hooks for what passes from one generation to the next beside the population.
     """
 
     # The hooks
+
+    PYMOO: ClassVar[str]
+    """Module below `pymoo.algorithms.moo` and class of the algorithm."""
+    SEVERAL: ClassVar[bool] = False
+    """Whether it needs two or more objectives."""
+
+    def check_objectives(self, m: int) -> None:
+        """Raise ValueError for a single objective, if the algorithm needs several."""
+        if self.SEVERAL:
+            check_several(type(self).__name__, self._presented_count(m))
 
     @abstractmethod
     def _size(self, m: int | None) -> int | None:
         """Number of individuals; None if it depends on the number m of objectives, which is not known."""
 
     @abstractmethod
-    def _algorithm(self, m: int) -> Any:
-        """A new pymoo algorithm for m objectives, as they are presented to it."""
+    def _arguments(self, m: int) -> dict[str, Any]:
+        """Arguments of the algorithm for m objectives, as they are presented to it."""
 
-    @abstractmethod
+    def _algorithm(self, m: int) -> Any:
+        """A new algorithm of pymoo for m objectives, as they are presented to it."""
+        module, _, kind = self.PYMOO.partition(":")
+        return getattr(import_module(f"pymoo.algorithms.moo.{module}"), kind)(**self._arguments(m))
+
     def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> State:
         """The state of the first population, before it is presented to the algorithm; `common` are the fields of all states."""
+        return State(**common)
 
-    @abstractmethod
     def _restore(self, algorithm: Any, state: Any, individuals: Any) -> None:
         """Restore the algorithm from the state; `individuals` are pymoo's individuals of `_table(state)`."""
+        algorithm.pop = individuals
 
-    @abstractmethod
     def _keep(self, algorithm: Any, state: Any, table: Members) -> None:
         """Update the fields of the state that belong to this algorithm; its individuals know their rows in `table`."""
 
@@ -161,7 +180,8 @@ class Baseline(PopulationSolver):
         end = MaximumGenerationTermination(-(-budget // size))
         end.update = lambda algorithm: 0.0  # it ends nothing, but says to an algorithm how many generations there are
         m = self._presented_count(m)
-        algorithm, d, constraints = self._algorithm(m), len(evaluator.free), int(self._compares_violations)
+        algorithm = self._algorithm(m)
+        d, constraints = len(evaluator.free), int(self.COMPARES_VIOLATIONS)
         problem = Problem(n_var=d, n_obj=m, n_ieq_constr=constraints, xl=evaluator.lower, xu=evaluator.upper)
         algorithm.setup(problem, termination=end, evaluator=VoidEvaluator(value=None), seed=0)
         algorithm.random_state = rng
@@ -193,12 +213,3 @@ class Baseline(PopulationSolver):
 def rows_of(individuals: Any) -> np.ndarray:
     """Rows (n,) of pymoo's individuals in the table of all points."""
     return np.array([one.data["row"] for one in individuals], dtype=int)
-
-
-def variation(crossover: float, crossover_eta: float, mutation_eta: float, **more: Any) -> dict[str, Any]:
-    """Operators of a genetic algorithm of pymoo, by the names of its arguments: simulated binary crossover with this probability, and
-    polynomial mutation; `more` are arguments of the crossover."""
-    from pymoo.operators.crossover.sbx import SBX
-    from pymoo.operators.mutation.pm import PM
-
-    return {"crossover": SBX(eta=crossover_eta, prob=crossover, **more), "mutation": PM(eta=mutation_eta)}

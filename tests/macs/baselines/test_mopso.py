@@ -12,7 +12,7 @@ from moocore import igd
 from plain import zdt
 
 from macs import MOPSO, MOPSOCD
-from macs.baselines.mopso import hypercubes, improved, inertia, moved, roulette, thin_out, velocities
+from macs.baselines.swarms import hypercubes, improved, inertia, moved, roulette, thin_out, velocities
 from macs.evaluation.evaluator import Box, Counts, Evaluation, Evaluator
 from macs.pareto.dominance import nondominated
 from macs.solvers.solver import solver
@@ -272,7 +272,7 @@ def test_one_leader_is_followed_by_all_particles(monkeypatch) -> None:
         counts.append(count)
         return roulette(cube, count, rng)
 
-    monkeypatch.setattr("macs.baselines.mopso.roulette", counted)
+    monkeypatch.setattr("macs.baselines.swarms.roulette", counted)
     for one in (True, False):
         MOPSO(particles=20, one_leader=one).minimize(schaffer, [(-4.0, 4.0)], evaluations=100, seed=1)
     assert counts == [1] * 4 + [20] * 4
