@@ -1,4 +1,4 @@
-"""Swarms: MOPSO, whose leaders are points in sparsely populated hypercubes of an archive, and MOPSO-CD of pymoo, whose are the least crowded."""
+"""Swarms: MOPSO, led by points in sparsely populated hypercubes of an archive, and pymoo's MOPSO-CD, led by the least crowded ones."""
 
 from __future__ import annotations
 
