@@ -10,8 +10,7 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from problems.vector import CompiledVectorProblem
-from problems.vector_problem import VectorProblem
+from problems.vector import CompiledVectorProblem, VectorProblem
 from transcription.base import Transcription
 
 from .fronts import files

@@ -11,8 +11,7 @@ import numpy as np
 from problems.checks import check_choice, check_count
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from problems.vector import CompiledVectorProblem, without_dynamics
-from problems.vector_problem import VectorProblem
+from problems.vector import CompiledVectorProblem, VectorProblem, without_dynamics
 from transcription.base import Transcription
 
 from .evaluation.evaluator import CONVERGED, Evaluator

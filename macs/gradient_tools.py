@@ -16,8 +16,8 @@ import numpy as np
 
 from problems.checks import check_count
 from problems.compiled import CompiledProblem
-from problems.peaks import refuse_peaks
 from problems.problem import Problem
+from problems.sampling import refuse_peaks
 from transcription import DFET
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.meshed import Meshed

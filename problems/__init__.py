@@ -4,8 +4,7 @@ from .catalogue import describe, is_catalogued, load, names
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
 from .phase import Phase
 from .problem import Problem
-from .vector import CompiledVectorProblem
-from .vector_problem import VectorProblem
+from .vector import CompiledVectorProblem, VectorProblem
 
 __all__ = [
     "CompiledPhase",

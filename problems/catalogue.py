@@ -18,7 +18,7 @@ from typing import Any
 from .cases import standard
 from .checks import unknown
 from .problem import DEFAULT_EVALUATIONS, Problem
-from .vector_problem import VectorProblem
+from .vector import VectorProblem
 
 STANDARD = "standard/"
 """What the names of the published problems begin with."""
@@ -69,8 +69,8 @@ FORMER_STANDARD = re.compile(r"problems\.cases\.standard\.\w+\.(\w+):problem")
 """Those of the published problems, each of which was a module."""
 FILE = "_problem_file_"
 """Beginning of the names of modules that are read from files."""
-LARGEST = 2**24
-"""Bytes that a file with a problem may have."""
+PROBLEM_FILE_BYTES = 2**24
+"""Most that a file with a problem may have."""
 
 
 def names() -> tuple[str, ...]:
@@ -226,8 +226,8 @@ def _file_module(place: str) -> ModuleType:
     if not path.is_file():
         # A pipe or a device is not read: it may never end.
         raise ValueError(f"'{place}' is no ordinary file" if os.path.lexists(place) else f"there is no file '{place}'")
-    if path.stat().st_size > LARGEST:
-        raise ValueError(f"'{place}' has {path.stat().st_size} bytes, a file with a problem at most {LARGEST}")
+    if path.stat().st_size > PROBLEM_FILE_BYTES:
+        raise ValueError(f"'{place}' has {path.stat().st_size} bytes, a file with a problem at most {PROBLEM_FILE_BYTES}")
     name = f"{FILE}{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -14,9 +14,6 @@ import numpy as np
 
 from .compiled import Limit, Variable
 
-NARROWEST, SMALLEST = 1e-12, 1e-300
-"""The width of an interval, as a part of its larger end, and by itself, up to which it is one value; see `apart`."""
-
 
 def new_name(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
     """What messages call a new thing, whose name must be a non-empty string that is not among `taken`."""
@@ -77,7 +74,7 @@ def apart(lower: float, upper: float) -> bool:
 
     Where they are not, rounding alone leaves the interval, and no solver finds its way inside: it is one value.
     """
-    return math.isinf(upper - lower) or upper - lower > max(NARROWEST * max(abs(lower), abs(upper)), SMALLEST)
+    return math.isinf(upper - lower) or upper - lower > max(1e-12 * max(abs(lower), abs(upper)), 1e-300)
 
 
 def fixed_or_interval(value: Any, what: str) -> tuple[float, float]:

@@ -6,18 +6,53 @@ Everything above this floor reads a problem through these classes. They pickle, 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, wraps
 from heapq import heappop, heappush
-from typing import Any
+from inspect import unwrap
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import casadi as ca
 import numpy as np
 
-from .derived import Deriving
+Owner = TypeVar("Owner", bound="Deriving")
+Further = ParamSpec("Further")
+Result = TypeVar("Result")
 
-FINGERPRINT_POINTS = 64
+
+class Deriving:
+    """A value that keeps what `remembered` functions compute from it. Pickles and copies begin without."""
+
+    @cached_property
+    def derived(self) -> dict[Hashable, Any]:
+        """Results by (function, further arguments)."""
+        return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "derived"}
+
+
+def remembered(function: Callable[Concatenate[Owner, Further], Result]) -> Callable[Concatenate[Owner, Further], Result]:
+    """A function of a value, and perhaps of further hashable arguments by position, that computes each result once."""
+
+    @wraps(function)
+    def once(owner: Owner, *further: Further.args, **none: Further.kwargs) -> Result:
+        key = (function, *further)
+        if key not in owner.derived:
+            owner.derived[key] = function(owner, *further, **none)
+        result: Result = owner.derived[key]
+        return result
+
+    return once
+
+
+def computed(
+    function: Callable[Concatenate[Owner, Further], Result], owner: Owner, *further: Further.args, **none: Further.kwargs
+) -> Result | None:
+    """What a `remembered` function has computed already; None if it has not been asked."""
+    result: Result | None = owner.derived.get((unwrap(function), *further))
+    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,7 +337,7 @@ class CompiledProblem(Deriving):
 def _essence(function: ca.Function, ranges: Sequence[Sequence[tuple[float, float]]]) -> bytes:
     """The identity of a Function: its operations, and its values at fixed points within the ranges of its inputs."""
     rng = np.random.default_rng(0)
-    points = [np.array([rng.uniform(*limits, FINGERPRINT_POINTS) for limits in group]).reshape(-1, FINGERPRINT_POINTS) for group in ranges]
+    points = [np.array([rng.uniform(*limits, 64) for limits in group]).reshape(-1, 64) for group in ranges]
     values = np.array(function(*points)) if function.size1_out(0) else np.empty(0)
     return function.str(True).encode() + " ".join(f"{value:.8e}" for value in values.ravel()).encode()
 

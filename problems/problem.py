@@ -12,9 +12,8 @@ import casadi as ca
 
 from . import checks
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable, in_time, vector_function
-from .peaks import with_sizes
 from .phase import Phase
-from .sanity import check_links, check_numbers
+from .sampling import check_links, check_numbers, with_sizes
 
 DEFAULT_EVALUATIONS = 2_000
 """Default number of evaluations of a case of the catalogue that does not set its own."""

@@ -16,16 +16,7 @@ import casadi as ca
 import numpy as np
 
 from .compiled import CompiledPhase, CompiledProblem, Limit, Objective, Variable
-from .peaks import NEGLIGIBLE, refuse_peaks, with_sizes
-
-SAMPLES = 512
-"""Random values of the objectives at which functions of them are looked at, besides the corners of their ranges."""
-CORNERS = 8
-"""Most objectives of which all corners are looked at."""
-INSIDE = 1e-6
-"""By what part of their ranges the corners lie inside."""
-WIDER = 1.0
-"""By how many times its range among those values a maximum may leave it."""
+from .sampling import NEGLIGIBLE, refuse_peaks, with_sizes
 
 
 class Valuation(Protocol):
@@ -49,7 +40,7 @@ class Valuation(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class ObjectiveBox:
     """Where objectives (m,) are, in the user's units: best and worst as the one who decides sees them, and within which limits they are
     looked for, lower and upper."""
 
@@ -119,7 +110,7 @@ class Valued:
 
 
 def valued(
-    problem: CompiledProblem, aim: Valuation, box: Box, *, kept: Sequence[tuple[Valuation, float]] = (), zero: float = 0.0
+    problem: CompiledProblem, aim: Valuation, box: ObjectiveBox, *, kept: Sequence[tuple[Valuation, float]] = (), zero: float = 0.0
 ) -> Valued:
     """The problem with a function of its objectives in their place."""
     program = _Program(problem, [aim, *(one for one, _ in kept)], box)
@@ -170,7 +161,7 @@ class _Program:
     `symbols` are these parameters, `exact` the objectives themselves; `rows` has an expression for each of `limits`.
     """
 
-    def __init__(self, problem: CompiledProblem, aims: Sequence[Valuation], box: Box) -> None:
+    def __init__(self, problem: CompiledProblem, aims: Sequence[Valuation], box: ObjectiveBox) -> None:
         m = len(problem.goals)
         self.exact = ca.MX.sym("J", m)
         J = [ca.MX.sym(f"J{i}") for i in range(m)]
@@ -190,7 +181,8 @@ class _Program:
         inner, outer = (_finite(_at(J, maxima, objectives)) for objectives in (box.inner(), box.outer()))
         self.spreads = [_spread(row) for row in _at(J, whole, box.inner())]
         low, high = outer.min(axis=1, initial=np.inf), outer.max(axis=1, initial=-np.inf)
-        wide = WIDER * np.where(high > low, high - low, 1.0)
+        # A maximum may leave its range among those values by as much as that.
+        wide = np.where(high > low, high - low, 1.0)
         self.names = tuple(problem.goals[i].name for i in used)
         self.exactly = [problem.goals[i].name for i in used if not rising[i]]
         taken = {v.name for v in problem.parameters}
@@ -252,7 +244,7 @@ def _new(name: str, taken: Container[str]) -> str:
     return name if name not in taken else _new(f"{name}'", taken)
 
 
-def _rising(J: Sequence[ca.MX], rows: Sequence[ca.MX], box: Box, signs: np.ndarray) -> np.ndarray:
+def _rising(J: Sequence[ca.MX], rows: Sequence[ca.MX], box: ObjectiveBox, signs: np.ndarray) -> np.ndarray:
     """Mask (m,) of the objectives, all minimised, with which no row falls where they are not better than what is known to be best: for
     these, a bound from above does as well as the objective itself, and better, since it leaves room."""
     column = ca.vertcat(*rows)
@@ -282,10 +274,10 @@ def _spread(values: np.ndarray) -> float:
 
 
 def _inside(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Values (m, k) between two corners: random ones, and all corners as long as there are few."""
+    """Values (m, k) between two corners: 512 random ones, and all corners, of at most eight objectives."""
     m = len(lower)
     rng = np.random.default_rng(0)
-    corners = np.array(np.meshgrid(*[[0.0, 1.0]] * m)).reshape(m, -1) if m <= CORNERS else np.empty((m, 0))
+    corners = np.array(np.meshgrid(*[[0.0, 1.0]] * m)).reshape(m, -1) if m <= 8 else np.empty((m, 0))
     # Just inside, where there are no kinks.
-    share = np.clip(np.hstack([corners, rng.random((m, SAMPLES))]), INSIDE, 1.0 - INSIDE)
+    share = np.clip(np.hstack([corners, rng.random((m, 512))]), 1e-6, 1.0 - 1e-6)
     return lower[:, None] + share * (upper - lower)[:, None]

@@ -31,7 +31,7 @@ def test_the_limits_that_it_names_are_those_of_the_code():
         "dialogues": dialogue_file.LARGEST,
         "checkpoints": checkpoint.LARGEST,
         "tables": DATA_BYTES,
-        "files": catalogue.LARGEST,
+        "files": catalogue.PROBLEM_FILE_BYTES,
         "preferences": inputs.LARGEST,
     }
-    assert file.LARGEST == catalogue.LARGEST
+    assert file.LARGEST == catalogue.PROBLEM_FILE_BYTES

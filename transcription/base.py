@@ -12,11 +12,9 @@ import casadi as ca
 import numpy as np
 
 from problems.checks import settings_of, short_repr
-from problems.compiled import CompiledProblem, Variable
-from problems.derived import Deriving, computed, remembered
+from problems.compiled import CompiledProblem, Deriving, Variable, computed, remembered
 from problems.problem import Problem
-from problems.vector import CompiledVectorProblem, without_dynamics
-from problems.vector_problem import VectorProblem
+from problems.vector import CompiledVectorProblem, VectorProblem, without_dynamics
 
 from .numerics.batched import Batched
 from .phases.adjoint import Adjoint

@@ -6,8 +6,7 @@ from typing import Any
 
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from problems.vector import CompiledVectorProblem
-from problems.vector_problem import VectorProblem
+from problems.vector import CompiledVectorProblem, VectorProblem
 from transcription.base import Transcription, check_method, check_problem
 
 from ..fronts.point import Point

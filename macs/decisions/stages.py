@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from problems.compiled import CompiledProblem
-from problems.valued import Box, Valued, valued
+from problems.valued import ObjectiveBox, Valued, valued
 from transcription import from_dict
 from transcription.base import NLP
 from transcription.meshed import Meshed
@@ -103,7 +103,7 @@ class StageSolver:
         self, problem: CompiledProblem, best: np.ndarray, worst: np.ndarray, solves: GradientSolves, rng: np.random.Generator
     ) -> None:
         self.problem, self.solves, self.rng = problem, solves, rng
-        self._box = Box(best, worst, np.minimum(best, worst), np.maximum(best, worst))
+        self._box = ObjectiveBox(best, worst, np.minimum(best, worst), np.maximum(best, worst))
         self._room = np.full(len(best), ROOM)
 
     def on_mesh(self, stage: Stage, kept: Sequence[Kept], known: Known, starts: int) -> Outcome:

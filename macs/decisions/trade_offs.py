@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from problems.compiled import CompiledProblem, Objective
-from problems.derived import remembered
+from problems.compiled import CompiledProblem, Objective, remembered
 from problems.problem import Problem
 from transcription import from_dict
 from transcription.nlp.projection import Projection, projection

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from problems.compiled import Objective
-from problems.peaks import refuse_peaks
+from problems.sampling import refuse_peaks
 from transcription.base import NLP
 from transcription.inner import InnerSolver
 from transcription.nlp.dense import refuse_dense

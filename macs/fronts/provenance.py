@@ -16,8 +16,7 @@ import problems
 from problems.catalogue import is_catalogued
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from problems.vector import CompiledVectorProblem
-from problems.vector_problem import VectorProblem
+from problems.vector import CompiledVectorProblem, VectorProblem
 
 from ..evaluation.evaluator import Counts
 from ..io.text import document

@@ -9,7 +9,7 @@ import numpy as np
 
 from problems.checks import check_positive
 from problems.compiled import CompiledProblem, Limit, Variable
-from problems.sanity import objective_spreads
+from problems.sampling import objective_spreads
 from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.stopping import Stopped
 from transcription.trajectories.limits import excess

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from problems.checks import check_count, check_positive
-from problems.peaks import refuse_peaks
+from problems.sampling import refuse_peaks
 from transcription.base import NLP, Transcription, check_problem
 from transcription.inner import Propagate
 from transcription.stopping import Stopped

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from problems.compiled import CompiledProblem
-from problems.peaks import refuse_peaks
+from problems.sampling import refuse_peaks
 from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
 from transcription.meshed import Meshed

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import CompiledProblem, Objective
-from problems.peaks import refuse_peaks
+from problems.sampling import refuse_peaks
 from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.base import Transcription
 from transcription.catalogue import parse

@@ -15,8 +15,7 @@ import numpy as np
 from problems.checks import unknown
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from problems.vector import CompiledVectorProblem, without_dynamics
-from problems.vector_problem import VectorProblem
+from problems.vector import CompiledVectorProblem, VectorProblem, without_dynamics
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.inner import InnerSolver, inner_solver
 from transcription.smooth import Smooth

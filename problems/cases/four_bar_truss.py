@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vector_problem import VectorProblem
+from ..vector import VectorProblem
 
 FORCE, STRESS, MODULUS, LENGTH = 10.0, 10.0, 2e5, 200.0
 """kN, kN/cm2, kN/cm2, cm."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..vector_problem import VectorProblem
+from ..vector import VectorProblem
 
 LOAD, LENGTH = 6000.0, 14.0
 """Force at the free end, lb, and its distance from the weld, in."""

@@ -11,7 +11,7 @@ import pytest
 from smooth_problems import shuttle, two_wells, with_peak
 
 from problems import Problem, load
-from problems.valued import Box, Valued, valued
+from problems.valued import ObjectiveBox, Valued, valued
 from transcription import DFET
 
 
@@ -23,9 +23,9 @@ class Aim:
     name: str = "aim"
 
 
-def box(best: list[float], worst: list[float], room: float = 3.0) -> Box:
+def box(best: list[float], worst: list[float], room: float = 3.0) -> ObjectiveBox:
     low, high = np.minimum(best, worst), np.maximum(best, worst)
-    return Box(np.array(best), np.array(worst), low - room * (high - low), high + room * (high - low))
+    return ObjectiveBox(np.array(best), np.array(worst), low - room * (high - low), high + room * (high - low))
 
 
 def bent(J: Any, peaks: Any) -> Any:

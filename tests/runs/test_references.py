@@ -103,7 +103,7 @@ def test_closed_forms():
     with pytest.raises(ValueError, match=r"'landing_site' with landers = 2"):
         closed_form("landing_site", {"landers": 2})
     with pytest.raises(ValueError, match=r"no true front of 'problems\.sanity:"):
-        closed_form("problems.sanity:problem")
+        closed_form("problems.sampling:problem")
 
 
 def test_a_foreign_front_may_be_empty():

@@ -9,7 +9,7 @@ three on which its steps needed no least squares with signs).
 
 from __future__ import annotations
 
-from problems.derived import remembered
+from problems.compiled import remembered
 
 from ..base import NLP
 from ..nlp.dense import too_dense

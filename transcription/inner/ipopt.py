@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from problems.checks import check_choice, check_count, check_positive
-from problems.derived import remembered
+from problems.compiled import remembered
 
 from ..base import FAILED, NLP, TIMEOUT
 from ..nlp.dense import refuse_dense

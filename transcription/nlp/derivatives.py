@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from problems.derived import remembered
+from problems.compiled import remembered
 
 from ..base import NLP
 from .dense import refuse_dense

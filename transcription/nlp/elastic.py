@@ -14,8 +14,8 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from problems.derived import remembered
-from problems.peaks import refuse_peaks
+from problems.compiled import remembered
+from problems.sampling import refuse_peaks
 
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..phases.writer import DYNAMICS

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem
-from problems.derived import remembered
+from problems.compiled import CompiledPhase, CompiledProblem, remembered
 
 
 def hamiltonian(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from problems.derived import remembered
-from problems.peaks import refuse_peaks
+from problems.compiled import remembered
+from problems.sampling import refuse_peaks
 
 from ..base import NLP
 from ..stopping import check_stopping

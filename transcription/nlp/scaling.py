@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.derived import remembered
+from problems.compiled import remembered
 
 from ..base import INFEASIBLE, NLP, TIMEOUT
 from .derivatives import gradients, objective_gradients

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase
-from problems.derived import remembered
+from problems.compiled import CompiledPhase, remembered
 
 from ..numerics.batched import Batched, expanded
 from ..numerics.periodic import wrapped

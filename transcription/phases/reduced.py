@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from problems.derived import Deriving, remembered
+from problems.compiled import Deriving, remembered
 
 from ..numerics.batched import Batched
 from .layout import Layout

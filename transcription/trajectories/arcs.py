@@ -10,8 +10,7 @@ import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from problems.compiled import CompiledPhase
-from problems.derived import remembered
+from problems.compiled import CompiledPhase, remembered
 
 from ..numerics.batched import expanded
 from ..numerics.periodic import wrapped

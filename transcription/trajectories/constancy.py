@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem
-from problems.derived import remembered
+from problems.compiled import CompiledPhase, CompiledProblem, remembered
 
 from .costates import Costates, PhaseCostates, has_length
 from .trajectory import PhaseTrajectory, Trajectory

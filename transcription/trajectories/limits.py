@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
-from problems.derived import remembered
+from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered
 
 from ..numerics.batched import Batched, expanded
 from ..numerics.periodic import wrapped

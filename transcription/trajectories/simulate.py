@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, verified_scale
-from problems.derived import remembered
+from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered, verified_scale
 
 from .arcs import METHODS, Arcs
 from .limits import DENSE, excess, largest_on_elements, paths_and_peaks

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...vector_problem import VectorProblem
+from ...vector import VectorProblem
 from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, judged, shapes_of
 from .dispersions import Capsule, Dispersions, Outcome, outcomes
 from .mars import ARRIVAL_SPEED, EXIT_SPEED, exit_speeds

@@ -1,21 +1,27 @@
-"""Expressions that are no numbers anywhere: a division by zero, the root of something negative, a NaN among the user's data."""
+"""Judgements of expressions by their values and slopes at samples within the bounds.
+
+Expressions that are no numbers anywhere: a division by zero, the root of something negative, a NaN among the user's data. And permitted
+uses of peaks, and of integrals of absolute values, where derivatives are used: the maximum over time is no smooth function, but a number
+not below any value is as good, as long as it pays to make it small. So a peak may be minimised or bounded above. In the same way a number
+that is below neither a value nor its negative stands for the absolute value in an integral.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
-from .compiled import CompiledPhase, CompiledProblem, Variable
-from .derived import remembered
+from .compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered
 
-SAMPLES, FEW = 2048, 64
-"""Most samples; as many as do where each expression is a number at one of them."""
-ROUNDING = 1e-9
-"""Part of its values up to which a constraint is the same in all samples."""
+SAMPLE_COUNTS = (64, 2048)
+"""Of samples: as many as do where each expression is a number at one of them, and the most."""
+FEW, MOST = SAMPLE_COUNTS
+NEGLIGIBLE = 1e-9
+"""Part of the largest value, or slope, up to which a difference is rounding."""
 Labels = Mapping[str, Sequence[str]]
 
 
@@ -41,10 +47,10 @@ def objective_spreads(problem: CompiledProblem) -> np.ndarray:
 
 
 def _sampled(problem: CompiledProblem, labels: Sequence[Labels]) -> list[np.ndarray]:
-    """The same, (size, FEW) each, or (size, SAMPLES) where few are not enough to find numbers. Raises as `check_numbers` does."""
+    """The same, (size, FEW) each, or (size, MOST) where few are not enough to find numbers. Raises as `check_numbers` does."""
     with suppress(ValueError):
         return _checked(problem, labels, FEW)
-    return _checked(problem, labels, SAMPLES)
+    return _checked(problem, labels, MOST)
 
 
 def _checked(problem: CompiledProblem, labels: Sequence[Labels], count: int) -> list[np.ndarray]:
@@ -86,8 +92,12 @@ def check_links(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
     except ValueError:  # few samples are not enough to find numbers, so they say nothing
         return
     for limit, before, values in zip(problem.limits, free, linked, strict=True):
-        same = np.ptp(values) <= ROUNDING * max(np.ptp(before), np.abs(values).max())
-        if same and np.ptp(before) > 0.0 and not limit.lower - limit.scale * ROUNDING <= values[0] <= limit.upper + limit.scale * ROUNDING:
+        same = np.ptp(values) <= NEGLIGIBLE * max(np.ptp(before), np.abs(values).max())
+        if (
+            same
+            and np.ptp(before) > 0.0
+            and not limit.lower - limit.scale * NEGLIGIBLE <= values[0] <= limit.upper + limit.scale * NEGLIGIBLE
+        ):
             wanted = f"at least {limit.lower:g}" if values[0] < limit.lower else f"at most {limit.upper:g}"
             raise ValueError(
                 f"constraint '{limit.name}' of problem '{problem.name}' is {values[0]:g} wherever the links hold, and must be {wanted}: "
@@ -97,7 +107,7 @@ def check_links(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
 
 @dataclass(frozen=True)
 class _Draw:
-    """Samples of one phase: times, shares of the way, states at both ends and in between, controls; (size, SAMPLES) each."""
+    """Samples of one phase: times, shares of the way, states at both ends and in between, controls; (size, MOST) each."""
 
     t0: np.ndarray
     tf: np.ndarray
@@ -111,10 +121,10 @@ class _Draw:
 def _drawn(phase: CompiledPhase, rng: np.random.Generator) -> _Draw:
     t0, tf = _between(rng, [phase.t0]), _between(rng, [phase.tf])
     tf = np.where(tf > t0, tf, np.minimum(t0 + phase.duration[0], phase.tf.upper))
-    share = rng.random(SAMPLES)
+    share = rng.random(MOST)
     first, last = _within(rng, phase.initial), _within(rng, phase.final)
     # Half of the samples anywhere in the box, half of them near the ways from the initial to the final states.
-    inside = np.where(np.arange(SAMPLES) % 2, _between(rng, phase.states), first + share * (last - first))
+    inside = np.where(np.arange(MOST) % 2, _between(rng, phase.states), first + share * (last - first))
     return _Draw(t0, tf, share, first, last, inside, _between(rng, phase.controls))
 
 
@@ -139,7 +149,7 @@ def _between(rng: np.random.Generator, variables: Sequence[Variable]) -> np.ndar
 
 def _within(rng: np.random.Generator, ranges: Sequence[tuple[float, float]]) -> np.ndarray:
     lower, upper = np.array(ranges, dtype=float).reshape(-1, 2, 1).transpose(1, 0, 2)
-    return lower + rng.random((len(ranges), SAMPLES)) * (upper - lower)
+    return lower + rng.random((len(ranges), MOST)) * (upper - lower)
 
 
 def _finite(function: ca.Function, inputs: Sequence[np.ndarray], labels: Sequence[str]) -> np.ndarray:
@@ -153,3 +163,61 @@ def _finite(function: ca.Function, inputs: Sequence[np.ndarray], labels: Sequenc
             raise ValueError(f"{label} is not a finite number anywhere within the bounds")
         row[~good] = np.resize(row[good], np.count_nonzero(~good))
     return values
+
+
+def refuse_peaks(problem: CompiledProblem) -> None:
+    """Raise a ValueError that names an objective or a constraint in which a peak is used otherwise, and the peak's phase.
+
+    By the signs of derivatives at points all over the ranges of their arguments.
+    """
+    if not any(phase.peaks.size1_out(0) for phase in problem.phases):
+        return
+    peaks = [np.arange(phase.n_quantities - phase.peaks.size1_out(0), phase.n_quantities) for phase in problem.phases]
+    for function, row, i, _ in _wrong(problem, peaks, samples(problem)):
+        peak = f"a peak of phase '{problem.phases[i].name}'"
+        if function is problem.objectives:
+            what = f"objective '{problem.goals[row].name}' of problem '{problem.name}' improves when {peak} rises"
+        else:
+            what = f"constraint '{problem.limits[row].name}' of problem '{problem.name}' can be met by a rise of {peak}"
+        raise ValueError(f"{what}: gradient tools can only minimise a peak or bound it above; a minimum over time is -peak(-expr)")
+
+
+def with_sizes(problem: CompiledProblem) -> CompiledProblem:
+    """The problem with those `sizes` only, of which the integral is minimised or bounded above and not used otherwise."""
+    if not any(phase.sized for phase in problem.phases):
+        return problem
+    points = samples(problem)
+    first = [2 + phase.initials.size1_out(0) + phase.finals.size1_out(0) for phase in problem.phases]
+    columns = [at + np.array(phase.sized, dtype=int) for at, phase in zip(first, problem.phases, strict=True)]
+    wrong = {(i, column - first[i]) for _, _, i, column in _wrong(problem, columns, points)}
+    phases = []
+    for i, phase in enumerate(problem.phases):
+        kept = [k for k, row in enumerate(phase.sized) if (i, row) not in wrong]
+        inputs = phase.sizes.mx_in()
+        sizes = ca.Function("sizes", inputs, [phase.sizes(*inputs)[kept, :]], phase.sizes.name_in(), ["sizes"])
+        duration = points[i][1] - points[i][0]
+        scales = [float(np.median(points[i][columns[i][k]] / duration)) or 1.0 for k in kept]
+        phases.append(replace(phase, sizes=sizes, sized=tuple(phase.sized[k] for k in kept), size_scales=tuple(scales)))
+    return replace(problem, phases=tuple(phases))
+
+
+def _wrong(
+    problem: CompiledProblem, columns: Sequence[np.ndarray], points: list[np.ndarray]
+) -> Iterator[tuple[ca.Function, int, int, int]]:
+    """Function, row, phase and column wherever a row that is limited from above falls, or one limited from below rises, with one of the
+    `columns` of a phase's quantities."""
+    objectives = [Limit(goal.name, -np.inf, 0.0) for goal in problem.goals]
+    for function, limits in ((problem.objectives, objectives), (problem.constraints, problem.limits)):
+        above, below = (np.isfinite([getattr(limit, side) for limit in limits]) for side in ("upper", "lower"))
+        inputs = function.mx_in()
+        for i, chosen in enumerate(columns):
+            if not len(limits) or not len(chosen):
+                continue
+            slopes = ca.densify(ca.jacobian(function(*inputs), inputs[i])[:, chosen.tolist()])
+            flat = np.array(ca.Function("slopes", inputs, [ca.vec(slopes)])(*points))
+            found = flat.reshape(len(chosen), len(limits), -1)
+            found = np.where(np.isfinite(found), found, 0.0)
+            rounding = NEGLIGIBLE * np.abs(found).max(axis=2, initial=0.0)
+            falls, rises = found.min(axis=2) < -rounding, found.max(axis=2) > rounding
+            for k, row in np.argwhere((falls & above) | (rises & below)):
+                yield function, int(row), i, int(chosen[k])
