@@ -22,9 +22,9 @@ from transcription import DFET
 from transcription.base import Transcription, check_freedom, check_problem
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
-from transcription.nlp.dense import refuse_dense
+from transcription.nlp.derivatives import refuse_dense
+from transcription.nlp.program import nlp_scales
 from transcription.nlp.scalarized import Solved
-from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import Stopped
 
 from .evaluation.evaluator import CONVERGED, INFEASIBLE

@@ -2,8 +2,8 @@
 
 from .base import NLP, Transcription
 from .catalogue import from_dict, parse, stated, word
-from .collocation.method import Collocation
-from .dfet.method import DFET
+from .elements.collocation import Collocation
+from .elements.dfet import DFET
 from .inner import InnerResult, InnerSolver
 from .meshed import Meshed
 from .shooting.method import MultipleShooting, SingleShooting

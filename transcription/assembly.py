@@ -14,22 +14,17 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Link, Variable
 
-from .base import NLP, Profile, Transcription
+from .base import NLP, ControlProfile, Transcription
 from .numerics.batched import Batched, expanded
 from .phases.adjoint import Adjoint, PhaseMultipliers
-from .phases.guess import along
 from .phases.layout import Layout
-from .phases.pointwise import Parts, Pointwise
 from .phases.reduced import Reduced
-from .phases.writer import Ends, PhaseWriter, Rows, filled
+from .phases.rows import EndSlots, Parts, Pointwise, Rows
+from .phases.writer import PhaseWriter, along, filled
 from .stopping import check_stopping
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
-PEAK_SAMPLES = 1024
-TRUSTED = 1e-3
-"""Largest error at t0 of costates by the adjoint equation that are preferred to those of a method."""
-
-WriterFactory = Callable[[CompiledPhase, Layout, Ends], PhaseWriter]
+WriterFactory = Callable[[CompiledPhase, Layout, EndSlots], PhaseWriter]
 
 
 class Assembly:
@@ -108,7 +103,6 @@ class Assembly:
         )
 
     def guess(self) -> np.ndarray:
-        """See `NLP.guess`."""
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         found = {int(slot): self.problem.guesses.get(v.name, np.nan) for v, slot in slots}
         for writer in self._writers.values():
@@ -127,7 +121,7 @@ class Assembly:
         return np.array([found.get(slot, np.nan) for slot in self.layout.free])
 
     def widened(self, nlp: NLP) -> NLP:
-        """See `NLP.widen`; what the user guessed of the states, or the line that stands for it, is a guess like others."""
+        """What the user guessed of the states, or the line that stands for it, is a guess like others."""
         free = np.flatnonzero(np.isfinite(nlp.lower) & np.isfinite(nlp.upper))
         known = np.where(np.isfinite(nlp.guess), nlp.guess, 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free]))
         guess = self.guessed(known[None])[0]
@@ -140,7 +134,7 @@ class Assembly:
 
         return replace(nlp, free=free, guess=guess[free], guessed=guessed, profiles=self.profiles(free.tolist(), states=True))
 
-    def profiles(self, free: Sequence[int], *, states: bool = False) -> tuple[Profile, ...]:
+    def profiles(self, free: Sequence[int], *, states: bool = False) -> tuple[ControlProfile, ...]:
         """See `NLP.profiles`, where these variables are `free`; with `states`, those of the states, too."""
         column = {slot: i for i, slot in enumerate(free)}
         found = []
@@ -157,11 +151,10 @@ class Assembly:
                     rows = rows[np.isin(own[rows], free)]
                     if rows.size:
                         columns = np.array([column[int(slot)] for slot in own[rows]])
-                        found.append(Profile(f"{writer.phase.name}.{variable.name}", columns, places[rows]))
+                        found.append(ControlProfile(f"{writer.phase.name}.{variable.name}", columns, places[rows]))
         return tuple(found)
 
     def guessed(self, candidates: np.ndarray) -> np.ndarray:
-        """See `NLP.guessed`."""
         Z = np.zeros((len(candidates), len(self.layout.variables)))
         Z[:, self.layout.free] = candidates
         extended = self.layout.extended(Z)
@@ -194,7 +187,6 @@ class Assembly:
         )
 
     def tighten(self, Z: np.ndarray) -> np.ndarray:
-        """See `NLP.tighten`."""
         if not len(self._least):
             return Z
         Z = Z.copy()
@@ -202,20 +194,19 @@ class Assembly:
         return Z
 
     def unpack(self, z: np.ndarray) -> Trajectory:
-        """See `NLP.unpack`."""
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
         phases = tuple(writer.unpack(extended) for writer in self._declared)
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
 
     def costates(self, z: np.ndarray, multipliers: Mapping[str, np.ndarray]) -> dict[str, PiecewisePolynomial]:
-        """See `NLP.costates`; `multipliers` of the rows of dynamics by phase."""
+        """`multipliers` of the rows of dynamics by phase."""
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
         found = {writer.phase.name: writer.costates(extended, multipliers[writer.phase.name]) for writer in self._declared}
         return {name: costates for name, costates in found.items() if costates is not None}
 
     def adjoint(self, z: np.ndarray, multipliers: Mapping[str, PhaseMultipliers], swept: bool) -> dict[str, Adjoint]:
-        """See `NLP.adjoint`; multipliers by phase."""
+        """Multipliers by phase."""
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
         return {name: _adjoint(writer, extended, multipliers[name], swept) for name, writer in ((w.phase.name, w) for w in self._declared)}
 
@@ -233,7 +224,6 @@ class Assembly:
         }
 
     def interpolate(self, trajectory: Trajectory) -> np.ndarray:
-        """See `NLP.interpolate`."""
         extended = self.layout.extended(np.zeros((1, len(self.layout.variables))))
         write = self.layout.write
         write(extended, self.parameters, np.array([[trajectory.parameters[v.name] for v in self.problem.parameters]]))
@@ -248,7 +238,7 @@ class Assembly:
         lower, upper = (np.array([getattr(v, side) for v in self.layout.variables]) for side in ("lower", "upper"))
         return self.tighten(np.clip(Z, lower, upper))[0]
 
-    def _ends(self, i: int) -> Ends:
+    def _ends(self, i: int) -> EndSlots:
         """Slots of the ends of phase i: new variables, but for those that a link shares with a phase written before."""
         phase = self.problem.phases[i]
         prefix = f"{phase.name}."
@@ -271,7 +261,7 @@ class Assembly:
         slot_t0, slot_tf = (end(v, "", (v.lower, v.upper), True) for v in (phase.t0, phase.tf))
         initial = [end(v, "(t0)", limits, True) for v, limits in zip(phase.states, phase.initial, strict=True)]
         final = [end(v, "(tf)", limits, False) for v, limits in zip(phase.states, phase.final, strict=True)]
-        return Ends(slot_t0, slot_tf, np.array(initial), np.array(final), self.parameters)
+        return EndSlots(slot_t0, slot_tf, np.array(initial), np.array(final), self.parameters)
 
     def _add_peaks(self, phase: CompiledPhase) -> np.ndarray:
         """Slots of the phase's peaks: variables without bounds, of the largest size that the expression has anywhere."""
@@ -280,7 +270,7 @@ class Assembly:
             return np.empty(0, dtype=int)
         groups = [phase.states, phase.controls, (phase.tf,), (phase.t0, phase.tf, *self.problem.parameters)]
         rng = np.random.default_rng(0)
-        anywhere = [np.array([rng.uniform(v.lower, v.upper, PEAK_SAMPLES) for v in group]).reshape(-1, PEAK_SAMPLES) for group in groups]
+        anywhere = [np.array([rng.uniform(v.lower, v.upper, 1024) for v in group]).reshape(-1, 1024) for group in groups]
         sizes = np.abs(np.array(phase.peaks(*anywhere)))
         scales = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
         names = [f"{phase.name}.peak[{k}]" for k in range(count)]
@@ -326,8 +316,7 @@ class Assembly:
 
 
 def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultipliers, swept: bool) -> Adjoint:
-    """The costates of one phase. Polynomials of a method do not jump inside its elements, where multipliers of limits of states do: there,
-    those by the adjoint equation are better."""
+    """The costates of one phase: by the adjoint equation where limits make them jump inside elements, else the method's own."""
     known = None if swept else writer.costates(extended, multipliers.dynamics)
     if known is not None and not writer.limited(multipliers):
         return Adjoint(known)
@@ -335,7 +324,7 @@ def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultip
     if known is None:
         return found
     # Only at t0 is the error one of the integration alone: elsewhere it is also that jumps are taken to lie at nodes.
-    trusted = (found.error or 0.0) <= TRUSTED
+    trusted = (found.error or 0.0) <= 1e-3
     return found.beside(known, np.array([v.scale for v in writer.phase.states])) if trusted else Adjoint(known)
 
 

@@ -18,8 +18,8 @@ from problems.vector import CompiledVectorProblem, VectorProblem, without_dynami
 
 from .numerics.batched import Batched
 from .phases.adjoint import Adjoint
-from .phases.pointwise import Parts
 from .phases.reduced import Reduced
+from .phases.rows import Parts
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
@@ -117,7 +117,7 @@ def kept_nlp(problem: CompiledProblem, transcription: Transcription) -> NLP | No
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class ControlProfile:
     """The free variables that are one control of one phase."""
 
     name: str  # "phase.control"
@@ -146,7 +146,7 @@ class NLP(Deriving):
         What the row is, in the user's names. Rows of one thing share one label.
     guess : array (d,)
         What the user guessed of the free variables; NaN where nothing.
-    profiles : tuple of Profile
+    profiles : tuple of ControlProfile
         Which of the free variables are the controls, and where in time.
     guessed : callable
         Candidates (k, d) of the free variables -> vectors (k, n): the states by the user's guess, or on a line, or at their first value;
@@ -196,7 +196,7 @@ class NLP(Deriving):
     g_scale: np.ndarray
     g_labels: tuple[str, ...]
     guess: np.ndarray
-    profiles: tuple[Profile, ...]
+    profiles: tuple[ControlProfile, ...]
     guessed: Callable[[np.ndarray], np.ndarray]
     reduce: Callable[[], Reduced]
     tighten: Callable[[np.ndarray], np.ndarray]

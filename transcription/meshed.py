@@ -130,7 +130,6 @@ class Meshed(Transcription):
                     raise ValueError(f"{type(self).__name__}: phase '{name}' has no control '{control}'; its controls are {known}")
 
     def to_dict(self) -> dict[str, Any]:
-        """See `Transcription.to_dict`."""
         plain = super().to_dict()
         meshes = {name: mesh.to_dict() for name, mesh in self.meshes.items()} or None
         return plain | {"settings": plain["settings"] | {"mesh": meshes}}

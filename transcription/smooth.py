@@ -16,9 +16,6 @@ from problems.problem import Problem
 
 from .base import NLP, Transcription
 
-MANY, FINE = 1000, 50
-"""Places of a profile from which on values are interpolated; places between which that is done, in each length: it is exact to 1e-7."""
-
 
 @dataclass(frozen=True)
 class Smooth:
@@ -77,8 +74,7 @@ class Smooth:
         return self.shaped(nlp, lower + span * rng.random((count, len(nlp.free))))
 
     def shaped(self, nlp: NLP, candidates: np.ndarray, about: np.ndarray | None = None) -> np.ndarray:
-        """The candidates (k, d) that others (k, d) become, which were drawn evenly from their bounds, each variable by itself; `about` (d,)
-        stands in for the problem's guess."""
+        """Smooth candidates (k, d) from ones drawn evenly from the bounds; `about` (d,) stands in for the guess."""
         lower, upper, span = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.span[nlp.free]
         guess = nlp.guess if about is None else about
         noise = np.sqrt(12.0) * ((candidates - lower) / span - 0.5)
@@ -94,10 +90,10 @@ class Smooth:
 def smoothed(noise: np.ndarray, places: np.ndarray, length: float) -> np.ndarray:
     """Smooth values (c, k) of unit variance at `places` (k,), from independent ones (c, k).
 
-    At many places they are interpolated between as many as suffice for the length: the matrix would grow with the square of their number.
+    At many places they are interpolated between 50 a length, exactly to 1e-7: the matrix would grow with the square of their number.
     """
-    count = ceil(FINE / length)
-    if len(places) <= max(MANY, count):
+    count = ceil(50 / length)
+    if len(places) <= max(1000, count):
         return noise @ smoothing(places, length).T
     from scipy.interpolate import CubicSpline  # slow to import
 
@@ -107,7 +103,6 @@ def smoothed(noise: np.ndarray, places: np.ndarray, length: float) -> np.ndarray
 
 
 def smoothing(places: np.ndarray, length: float, at: np.ndarray | None = None) -> np.ndarray:
-    """A matrix (a, k) that makes smooth values of unit variance `at` some places (a,), by default the same, of independent ones at
-    `places` (k,)."""
+    """A matrix (a, k) that makes smooth values of unit variance `at` (a,) of independent ones at `places` (k,)."""
     weights = np.exp(-((((places if at is None else at)[:, None] - places) / length) ** 2))
     return weights / np.linalg.norm(weights, axis=1, keepdims=True)

@@ -18,6 +18,7 @@ Asked = Callable[[], str | bool]
 
 
 def _never() -> bool:
+    """Nothing asks to end."""
     return False
 
 

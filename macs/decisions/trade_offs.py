@@ -19,8 +19,8 @@ import numpy as np
 from problems.compiled import CompiledProblem, Objective, remembered
 from problems.problem import Problem
 from transcription import from_dict
-from transcription.nlp.projection import Projection, projection
-from transcription.nlp.weight_bounds import ratio_bounds, ratio_residual
+from transcription.nlp.optimality import ratio_bounds, ratio_residual
+from transcription.nlp.projection import TangentProjection, projection
 
 from ..fronts.builders import OPTIMAL
 from ..fronts.point import Point
@@ -340,7 +340,7 @@ class TradeOffs:
         )
 
     @cached_property
-    def _projection(self) -> Projection:
+    def _projection(self) -> TangentProjection:
         point = self.point
         if point.trajectory is None or point.transcription is None:
             raise ValueError(f"point {point.index} has no trajectory: its status is '{point.status}'")

@@ -8,7 +8,7 @@ from problems.compiled import Objective
 from problems.sampling import refuse_peaks
 from transcription.base import NLP
 from transcription.inner import InnerSolver
-from transcription.nlp.dense import refuse_dense
+from transcription.nlp.derivatives import refuse_dense
 from transcription.nlp.scalarized import scalarize
 from transcription.smooth import Smooth
 

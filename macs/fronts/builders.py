@@ -14,7 +14,7 @@ from transcription.base import NLP
 from transcription.nlp.costates import costates
 from transcription.nlp.elastic import opposing
 from transcription.nlp.optimality import Conditions
-from transcription.nlp.scaling import nlp_scales
+from transcription.nlp.program import nlp_scales
 from transcription.stopping import Stopped, check_stopping
 from transcription.trajectories.costates import Costates
 from transcription.trajectories.limits import excursions

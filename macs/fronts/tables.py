@@ -10,8 +10,8 @@ import numpy as np
 
 from problems.compiled import CompiledProblem
 from transcription.base import Transcription
-from transcription.dfet.method import DFET
-from transcription.trajectories.constancy import hamiltonian_variation
+from transcription.elements.dfet import DFET
+from transcription.trajectories.costates import hamiltonian_variation
 
 from ..evaluation.evaluator import CONVERGED
 from ..io.text import call, counted, duration, html_block, html_table, numbers, text_table

@@ -8,8 +8,8 @@ from itertools import permutations, product
 
 import numpy as np
 
+from transcription.nlp.program import nlp_scales
 from transcription.nlp.scalarized import Solved
-from transcription.nlp.scaling import nlp_scales
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED

@@ -17,8 +17,8 @@ import numpy as np
 
 from transcription.base import INFEASIBLE, NLP
 from transcription.nlp.derivatives import linear_objectives, objective_gradients
+from transcription.nlp.program import nlp_scales
 from transcription.nlp.scalarized import Solved
-from transcription.nlp.scaling import nlp_scales
 from transcription.smooth import Smooth
 from transcription.stopping import stopping
 

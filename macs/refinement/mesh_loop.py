@@ -12,10 +12,10 @@ from problems.sampling import refuse_peaks
 from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
 from transcription.meshed import Meshed
-from transcription.meshes.adaptation import next_method, redistributed, where_controls_gain
-from transcription.meshes.knots import at_switches, switched
-from transcription.meshes.minimum import Optimum
-from transcription.meshes.scales import objective_variations
+from transcription.meshes.errors import objective_variations
+from transcription.meshes.minimum import OptimumMultipliers
+from transcription.meshes.moving_edges import at_switches, switched
+from transcription.meshes.refinement import next_method, redistributed, where_controls_gain
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
 from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
@@ -186,7 +186,7 @@ class MeshLoop:
         trajectory: Trajectory,
         units: np.ndarray,
         by_gradients: bool,
-        optimum: Optimum | None = None,
+        optimum: OptimumMultipliers | None = None,
     ) -> OnMesh:
         """The assessment of a vector that was found on a mesh."""
         verdict = judge(self.problem, trajectory, self.wanted, F, units, optimum if self.wanted.confirmed else None)
@@ -282,7 +282,7 @@ class MeshLoop:
         if solved.status != CONVERGED:
             return None, solved.status
         z, F = solved.z, solved.F
-        optimum = None if solved.multipliers is None else Optimum.of(nlp, z, solved.multipliers)
+        optimum = None if solved.multipliers is None else OptimumMultipliers.of(nlp, z, solved.multipliers)
         reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients, optimum)
         # On the same mesh nothing can be seen of what that has wrong.
         change = np.inf if method == present.method else _change(present, F, task, self.wanted.settled)

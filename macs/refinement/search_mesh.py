@@ -11,7 +11,7 @@ from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from transcription.base import Transcription
 from transcription.catalogue import stated
-from transcription.dfet.method import DFET
+from transcription.elements.dfet import DFET
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh

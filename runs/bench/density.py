@@ -14,7 +14,7 @@ from problems.cases import goddard
 from problems.cases.standard import published
 from problems.catalogue import STANDARD
 from transcription import parse
-from transcription.meshes.scales import state_scales
+from transcription.meshes.errors import state_scales
 from transcription.trajectories.trajectory import PhaseTrajectory
 
 from .measured import Column, Row, Target, short, table

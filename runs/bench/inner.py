@@ -17,7 +17,7 @@ from macs.io.console import Steps
 from transcription import NLP
 from transcription.base import CONVERGED
 from transcription.inner import InnerResult, InnerSolver, Ipopt, Newton, Projection, Propagate
-from transcription.numerics.compiling import compiler
+from transcription.numerics.batched import compiler
 
 from .cases import BATCH, INNER, Batch, Case
 from .measured import Column, Row, Target, short, table, verdicts

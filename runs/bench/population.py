@@ -12,7 +12,7 @@ from macs.io.console import Steps
 from problems import load
 from transcription import Smooth, Transcription, parse
 from transcription.inner import Propagate
-from transcription.numerics.compiling import compiler
+from transcription.numerics.batched import compiler
 
 from .inner import compiling
 from .measured import Column, Row, Target, short, table, verdicts

@@ -10,7 +10,7 @@ import numpy as np
 
 from macs.front import Front
 from transcription import from_dict, parse
-from transcription.inner.effort import iteration
+from transcription.inner.base import iteration_work
 
 from ..batch.cells import Cell
 from ..batch.store import StoredRun
@@ -117,7 +117,7 @@ def _prices(runs: list[StoredRun]) -> dict[Cell, tuple[float, float]] | None:
     if source is None or not source.address:
         return None
     problem = source.load().compile()
-    price = {name: iteration(nlp) / len(nlp.lower) for name, nlp in ((name, one.nlp(problem)) for name, one in different.items())}
+    price = {name: iteration_work(nlp) / len(nlp.lower) for name, nlp in ((name, one.nlp(problem)) for name, one in different.items())}
     return {cell: (price[repr(own)], price[repr(other)]) for cell, (own, other) in schemes.items()}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -102,7 +103,7 @@ def test_where_all_solves_fail_the_message_says_why(monkeypatch: pytest.MonkeyPa
     """From the ends of the front, with boxes of a tenth of the bounds, solves do not reach what is asked for."""
     preference, known = ReferencePoint({"effort": 10.0, "time": 0.7}), ends()
     monkeypatch.setattr(scalarized, "_strategies", lambda *_: (scalarized.NEAR,))
-    monkeypatch.setattr(scalarized, "RESTARTS", 0)
+    monkeypatch.setattr(scalarized, "SOLVE", replace(scalarized.SOLVE, restarts=0))
     choice = decide(cart(), method, preference, ranges=RANGES, start=known)
     assert choice.message == f"achievement: {words}{scalarized.IN_BOX}; {NO_OPTIMUM}"
     assert choice.history[0].status == "failed" and choice.history[0].message == f"{words}{scalarized.IN_BOX}"

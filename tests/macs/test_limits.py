@@ -31,12 +31,11 @@ from problems import Problem, load
 from runs.cli import main
 from transcription import DFET, MultipleShooting
 from transcription.inner import Newton
-from transcription.nlp import pieces
+from transcription.nlp import derivatives
 from transcription.nlp.derivatives import gradients, hessian
+from transcription.nlp.program import Watched, ipopt_options
 from transcription.nlp.scalarized import scalarize
-from transcription.nlp.scaling import ipopt_options
-from transcription.nlp.watched import Watched
-from transcription.numerics import compiling
+from transcription.numerics import batched
 from transcription.numerics.batched import Batched
 from transcription.stopping import Stopped, stopped_by, stopping
 from transcription.trajectories import arcs
@@ -130,7 +129,7 @@ def test_derivatives_in_pieces_are_those_of_the_whole(monkeypatch):
     nlp, rng = MultipleShooting(9).transcribe(load("orbit_rise")), np.random.default_rng(0)
     z, lam, mu = nlp.lower + rng.random(len(nlp.lower)) * nlp.span, rng.random(2), rng.random(len(nlp.g_scale))
     whole = [np.array(ca.DM(one)) for one in (gradients(nlp)(z)[1], hessian(nlp)(z, lam, mu))]
-    monkeypatch.setattr(pieces, "PIECE", 7)
+    monkeypatch.setattr(derivatives, "PIECE", 7)
     again = MultipleShooting(9).transcribe(load("orbit_rise"))
     for one, other in zip(whole, (gradients(again)(z)[1], hessian(again)(z, lam, mu)), strict=True):
         assert np.abs(np.array(ca.DM(other)) - one).max() <= 1e-12 * np.abs(one).max()
@@ -140,7 +139,7 @@ def test_derivatives_in_pieces_are_those_of_the_whole(monkeypatch):
     ("method", "built"), [*((MultipleShooting(9), built) for built in range(1, 8, 2)), (DFET(3, 3), 1), (DFET(3, 3), 2)]
 )
 def test_they_are_not_built_to_the_end(method, built, monkeypatch):
-    monkeypatch.setattr(pieces, "PIECE", 7)
+    monkeypatch.setattr(derivatives, "PIECE", 7)
     nlp = method.transcribe(load("orbit_rise"))
     questions = iter(range(10**6))
     with stopped_by(lambda: next(questions) >= built):
@@ -290,7 +289,7 @@ def doubled(monkeypatch):
     """A Function that is compiled at its second call, by whatever CC is."""
     x = ca.SX.sym("x", 3)
     monkeypatch.setenv("MACS_COMPILE", "always")
-    monkeypatch.setattr(compiling, "_useless", set())
+    monkeypatch.setattr(batched, "_useless", set())
 
     def make(command: str) -> Batched:
         monkeypatch.setenv("CC", command)
@@ -312,14 +311,14 @@ def script(folder: Path, text: str) -> str:
 
 
 def test_a_compiler_that_hangs_is_given_up(doubled, tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(compiling, "SECONDS", LIMIT)
+    monkeypatch.setattr(batched, "COMPILER_SECONDS", LIMIT)
     command = script(tmp_path, f"sleep 60 & echo $! > {tmp_path}/pid; wait")
     with within(BOUND):
         assert right(doubled(command))
     assert "functions are not compiled" in caplog.text and "did not end within 0.5 s" in caplog.text
     state = subprocess.run(["ps", "-o", "stat=", "-p", (tmp_path / "pid").read_text()], capture_output=True, text=True).stdout
     assert not state.strip("Z+s \n"), "nor does what it has started live on"
-    assert compiling.compiler() is None, "it is not tried again"
+    assert batched.compiler() is None, "it is not tried again"
     caplog.clear()
     assert right(doubled(command)) and not caplog.text
 
@@ -328,7 +327,7 @@ def test_a_time_limit_ends_a_compiler(doubled, tmp_path, caplog):
     function = doubled(script(tmp_path, "sleep 60"))
     with Interrupts(LIMIT), within(BOUND):
         assert right(function)
-    assert not caplog.text and compiling.compiler(), "that was not its fault"
+    assert not caplog.text and batched.compiler(), "that was not its fault"
 
 
 @pytest.mark.parametrize("command", ["false", "/nowhere/cc", "true"])

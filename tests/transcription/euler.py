@@ -17,7 +17,8 @@ from transcription import NLP, Meshed, PhaseTrajectory, PiecewisePolynomial
 from transcription.assembly import Assembly
 from transcription.phases.layout import Layout
 from transcription.phases.mesh import PhaseMesh
-from transcription.phases.writer import Ends, PhaseWriter, Rows, Written
+from transcription.phases.rows import EndSlots, Rows, Written
+from transcription.phases.writer import PhaseWriter
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Euler(Meshed):
 class EulerPhase(PhaseWriter):
     """One phase on N elements. Slots: `U` (N, nu) of the controls, `B` (N + 1, nx) of the states at the ends of the elements."""
 
-    def __init__(self, mesh: PhaseMesh, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
+    def __init__(self, mesh: PhaseMesh, phase: CompiledPhase, layout: Layout, ends: EndSlots) -> None:
         super().__init__(phase, layout, ends)
         self.mesh = mesh
         prefix, n = f"{phase.name}.", mesh.elements

@@ -55,12 +55,6 @@ def test_an_nlp_is_shared_by_all_that_use_one_problem():
     assert not copied.derived and copied.fingerprint == problem.fingerprint and copied.compile() is copied
 
 
-def test_every_inner_level_makes_candidates_feasible():
-    nlp = METHOD.transcribe(load("goddard"))
-    for inner in ("auto", "ipopt"):
-        assert (inner_solver(inner).solve(nlp, candidates(nlp, 4)).violation <= 1e-6).all(), inner
-
-
 @pytest.mark.slow
 def test_gradient_tools_searches_and_mesh_refinement_work_on_it():
     problem, truth = load("goddard"), reference(2001)

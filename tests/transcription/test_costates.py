@@ -82,9 +82,9 @@ def ascent():
     return load("goddard").compile()
 
 
-@pytest.mark.parametrize("flight_time", [130.0, 220.0])
 @pytest.mark.parametrize("word", WORDS)
-def test_the_ascent_has_the_costates_of_the_linear_tangent_law(word, flight_time):
+def test_the_ascent_has_the_costates_of_the_linear_tangent_law(word):
+    flight_time = 130.0
     trajectory, found = adjoint(ascent(), word, reference=np.array([flight_time, 0.0]), weights=np.array([0.0, 1.0]))
     costate, flown = found["ascent"], trajectory["ascent"]
     weights, closed = tangent_law(flown.tf, flown.time)
@@ -183,30 +183,6 @@ def highest(x0: float) -> Problem:
     return problem
 
 
-def absolute(x0: float) -> Problem:
-    """An absolute value in an integral."""
-    problem = Problem("absolute")
-    run = problem.phase("run", t0=0, tf=1)
-    x = run.state("x", bounds=(-5, 5), initial=x0, final=1)
-    u = run.control("u", bounds=(-9, 9))
-    run.dynamics(x=u - x)
-    problem.minimize("cost", run.integral(ca.fabs(x - 3)) + run.integral(u**2))
-    return problem
-
-
-def periodic(x0: float) -> Problem:
-    """A heading that wraps around, beside a current."""
-    problem = Problem("periodic")
-    run = problem.phase("run", t0=0, tf=(0.5, 9))
-    run.state("x", bounds=(-5, 5), initial=x0, final=0)
-    y = run.state("y", bounds=(-5, 5), initial=0.2, final=1)
-    heading = run.control("heading", bounds=(-ca.pi, ca.pi), period=2 * ca.pi)
-    run.dynamics(x=ca.cos(heading) - 0.3 * y, y=ca.sin(heading))
-    problem.minimize("time", run.tf)
-    run.guess(heading=2.0)
-    return problem
-
-
 def mixed(x0: float) -> Problem:
     """Below a path constraint on state and control."""
     problem = Problem("mixed")
@@ -219,8 +195,8 @@ def mixed(x0: float) -> Problem:
     return problem
 
 
-STATEMENTS = {one.__name__: one for one in (pendulum, late, bounded, below, highest, absolute, periodic, mixed)}
-STARTS = {"late": -0.5, "absolute": 0.3, "periodic": 1.0}
+STATEMENTS = {one.__name__: one for one in (pendulum, late, bounded, below, highest, mixed)}
+STARTS = {"late": -0.5}
 FINE = {
     "gauss": "gauss:24x3",
     "radau": "radau:24x3",
@@ -255,20 +231,7 @@ def test_the_first_costate_is_the_slope_of_the_optimum(name, method):
     assert phase["x"][0] == pytest.approx(slope, rel=2e-2 if name == "mixed" else 2e-3, abs=1e-3)
 
 
-@pytest.mark.slow
-def test_what_path_constraints_on_controls_do_is_spread():
-    """Backward, they make costates bend and not jump: about as near to the polynomials of the method as the square of the steps."""
-    away = []
-    for elements in (10, 20, 40):
-        trajectory, own = adjoint(mixed(0.1), f"dfet:{elements}x3")
-        _, other = adjoint(mixed(0.1), f"dfet:{elements}x3", swept=True)
-        flown = trajectory["run"]
-        assert (flown["both"] > 2 - 1e-6).mean() > 0.3
-        away.append(np.abs(own["run"]["x"] - other["run"]["x"]).max() / np.abs(own["run"]["x"]).max())
-    assert away[0] < 0.02 and away[2] < 0.3 * away[0]
-
-
-@pytest.mark.parametrize("name", ["pendulum", "below", "highest", "absolute", "mixed"])
+@pytest.mark.parametrize("name", ["below", pytest.param("highest", marks=pytest.mark.slow), pytest.param("mixed", marks=pytest.mark.slow)])
 def test_methods_agree_along_the_whole_way(name):
     """Also where a limit pushes, in the mean over a short while: there costates of a mesh are steps."""
     places = np.linspace(0.025, 0.975, 20)[:, None] + np.linspace(-0.025, 0.025, 26)[:-1]
@@ -287,11 +250,8 @@ def test_methods_agree_along_the_whole_way(name):
 @pytest.mark.parametrize(
     "word",
     [
-        "gauss:9x3",
         "radau:9x3",
         "lobatto:9x3",
-        "chebyshev:9x3",
-        "dfet:9x3",
         "dfet:18x2:bernstein:1",
         "multiple-shooting:18:linear",
         "shooting:19:linear",
@@ -321,9 +281,7 @@ def test_the_error_tells_of_jumps_in_the_wrong_place(jump, error):
     assert adjoints.beside(known, np.ones(1)).error == pytest.approx(max(error, 1e-9))
 
 
-@pytest.mark.parametrize(
-    "word", ["gauss:8x3", "radau:8x3", "lobatto:8x3", "chebyshev:8x3", "dfet:8x3", "multiple-shooting:16:linear", "shooting:17:linear"]
-)
+@pytest.mark.parametrize("word", ["gauss:8x3", "chebyshev:8x3", "dfet:8x3", "shooting:17:linear"])
 def test_costates_jump_at_one_instant(word):
     """At a wall of 0.2, which is touched at 1/2 only, u = a + b t with b = 24 (1 - 4 wall) before, and -b after it."""
     trajectory, found = adjoint(load("standard/bryson_denham", wall=0.2), word)
@@ -374,8 +332,7 @@ def two_legs(parts: int) -> Problem:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
-    [(f"{w}:15x4", f"{w}:10x4") for w in ("gauss", "radau", "lobatto", "chebyshev")]
-    + [("dfet:15x4", "dfet:10x4"), ("multiple-shooting:50:linear", "multiple-shooting:40:linear")],
+    [("radau:15x4", "radau:10x4"), ("lobatto:15x4", "lobatto:10x4"), ("multiple-shooting:50:linear", "multiple-shooting:40:linear")],
 )
 def test_costates_go_on_across_links(words):
     whole_trajectory, whole = adjoint(two_legs(1), words[0])
@@ -385,24 +342,3 @@ def test_costates_go_on_across_links(words):
     for name, phase in trajectory.items():
         assert split[name].at_nodes == pytest.approx(whole["leg0"].polynomial(phase.time), abs=2e-3)
     assert whole["leg0"].hamiltonian == pytest.approx(np.full(len(whole_trajectory["leg0"].time), whole["leg0"].hamiltonian[0]), abs=1e-2)
-
-
-@pytest.mark.parametrize(
-    ("word", "swept"), [("dfet:4x3", False), ("dfet:4x3", True), ("multiple-shooting:6", False), ("shooting:7", False)]
-)
-def test_a_phase_without_length_and_one_without_controls(word, swept):
-    problem = Problem("stop")
-    fall = problem.phase("fall", t0=0, tf=(0, 1))
-    h = fall.state("h", bounds=(-5, 5), initial=2)
-    fall.dynamics(h=-1.0)
-    climb = problem.phase("climb", t0=(0, 1), tf=(0, 6))
-    g = climb.state("h", bounds=(-5, 5), final=3)
-    u = climb.control("u", bounds=(0, 2))
-    climb.dynamics(h=u)
-    problem.link(fall, climb)
-    problem.minimize("time", climb.tf + 0 * fall.final(h) + 0 * climb.final(g))
-    trajectory, found = adjoint(problem, word, swept=swept)
-    assert trajectory["fall"].tf < 1e-6
-    assert all(np.isfinite(one.at_nodes).all() and np.isfinite(one.hamiltonian).all() for one in found.values())
-    # A unit higher is half a unit of time less.
-    assert found["climb"]["h"] == pytest.approx(np.full(len(trajectory["climb"].time), -0.5), rel=1e-5)

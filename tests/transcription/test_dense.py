@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from macs import MACS, optimize
+from macs import MACS
 from problems import load
 from transcription import DFET, MultipleShooting, SingleShooting
-from transcription.inner import Ipopt, Newton, Propagate
-from transcription.nlp import dense
+from transcription.inner import Ipopt, Newton
+from transcription.nlp import derivatives
 from transcription.nlp.derivatives import gradients, hessian, objective_gradients
 
 
 @pytest.fixture
 def little(monkeypatch):
     """As if there were memory for few derivatives only: those of some 20 nodes."""
-    monkeypatch.setattr(dense, "MOST", 1e-4)
+    monkeypatch.setattr(derivatives, "MOST_GIGABYTES", 1e-4)
 
 
 def middle(nlp):
@@ -29,12 +28,6 @@ def test_as_many_are_counted_as_there_are():
         there = nlp.functions.jac_sparsity(1, 0).nnz()
         assert 0.8 * there < nlp.dense < 1.2 * there
     assert DFET(50, 2).transcribe(load("goddard")).dense == 0
-
-
-@pytest.mark.slow
-def test_those_of_multiple_shooting_grow_with_its_intervals():
-    counts = [MultipleShooting(n).transcribe(load("goddard")).dense for n in (100, 200, 400)]
-    assert np.allclose(np.diff(np.log2(counts)), 1.0, atol=0.05)
 
 
 @pytest.mark.parametrize("derive", [gradients, objective_gradients, hessian])
@@ -52,20 +45,6 @@ def test_inner_levels_that_need_derivatives_are_refused(little, inner):
         inner.solve(nlp, middle(nlp))
 
 
-def test_gradient_tools_are_refused(little):
-    with pytest.raises(ValueError, match="MultipleShooting"):
-        optimize(load("goddard"), SingleShooting(100), starts=1)
-
-
 def test_a_search_that_propagates_goes_on_without(little):
     front = MACS().solve(load("goddard"), SingleShooting(100), evaluations=40, seed=1, inner="propagate")
     assert front.stats["evaluations"] == 40 and front.stats["gradient_solves"] == 0
-
-
-@pytest.mark.slow
-def test_ten_thousand_nodes_are_propagated():
-    nlp = SingleShooting(10_000).transcribe(load("goddard"))
-    found = Propagate().solve(nlp, middle(nlp))
-    assert np.isfinite(found.F).all() and np.isfinite(found.violation).all() and found.work > 0
-    with pytest.raises(ValueError, match="about 24 GB"):
-        gradients(nlp)

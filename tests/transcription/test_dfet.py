@@ -6,8 +6,8 @@ import pytest
 from cases import candidates, decay, integrator, oscillator, oscillator_rates, propagated, slot
 from gauss import integrate
 
-from problems import Problem, load
-from transcription import DFET, Transcription, from_dict, parse
+from problems import load
+from transcription import DFET
 
 
 def sizes(nlp) -> tuple[int, int]:
@@ -64,101 +64,7 @@ def test_boundary_values_converge_with_order_2l_plus_2(basis, order):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * (order + 1), abs=0.35)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
-def test_between_nodes_the_states_converge_with_order_l_plus_2(order):
-    problem, _ = decay(tf=2.0)
-    errors, times = [], np.linspace(0, 2, 401)
-    for n in (4, 8):
-        nlp = DFET(n, order).transcribe(problem)
-        phase = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])["fall"]
-        errors.append(np.abs(phase.at(times)["x"] - np.exp(-times)).max())
-    assert np.log2(errors[0] / errors[1]) > order + 1.6
-
-
-def test_bases_agree_where_both_are_exact():
-    """The same control polynomial in both bases gives the same flight, objectives and integrals."""
-    problem, order = oscillator(), 3
-    first, second = (DFET(2, order, basis=basis).transcribe(problem) for basis in ("lobatto", "bernstein"))
-    z = propagated(first, k=1)[0]
-    phase = first.unpack(z)["swing"]
-    points = np.array([-0.9, -0.2, 0.4, 1.0])
-    from transcription.numerics import polynomials
-
-    solve = np.linalg.inv(polynomials.basis_matrix("bernstein", order, points))
-    other = second.first_guess(candidates(second, 1))
-    for name in ("m", "swing.t0", "swing.tf", "swing.x(t0)"):
-        other[0, slot(second, name)] = z[slot(first, name)]
-    for j in range(2):
-        coefficients = solve @ phase.control.on_element(j, points)
-        for k in range(order + 1):
-            for i, name in enumerate("uv"):
-                other[0, slot(second, f"swing.{name}[{j},{k}]")] = coefficients[k, i]
-    other = second.propagate(other)
-    assert second.unpack(other[0])["swing"].edge_states == pytest.approx(phase.edge_states, abs=1e-12)
-    F, _ = first.evaluate(z[None])
-    G, _ = second.evaluate(other)
-    assert pytest.approx(F, rel=1e-12) == G
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [(0, 1), (1, -1), (1.5, 1), (1, 1.0), ("2", 1), (True, 1), (1, True), (None, 1), (1, 1, -1), (1, 1, 2.0), (1, 1, None, "hermite")],
-    ids=str,
-)
-def test_bad_settings_are_refused(settings):
-    names = ("elements", "order", "control_order", "basis")
-    with pytest.raises(ValueError, match="|".join(names)):
-        DFET(**dict(zip(names, settings, strict=False)))
-
-
-def test_settings_travel():
-    for method in (DFET(4, 6), DFET(2, 3, control_order=1, basis="bernstein"), DFET(np.int64(3), np.int32(2))):
-        assert from_dict(method.to_dict()) == method
-        assert isinstance(method, Transcription) and hash(method) == hash(from_dict(method.to_dict()))
-    assert parse("dfet:4x6") == DFET(4, 6) and parse("DFET:4x6:bernstein") == DFET(4, 6, basis="bernstein")
-    for text in (
-        "",
-        "dfet",
-        "dfet:4",
-        "dfet:4x",
-        "dfet:x6",
-        "dfet:4x6x7",
-        "rk:4x6",
-        "dfet:-4x6",
-        "dfet:4x6:hermite",
-        "dfet:0x1",
-        "dfet:4.5x6",
-        "dfet:4x6:1:2",
-        "dfet:4x6:lobatto:bernstein",
-        "dfet:4x6:bernstein:1:1",
-    ):
-        with pytest.raises(ValueError):
-            parse(text)
-    with pytest.raises(ValueError, match="Magic"):
-        from_dict({"method": "Magic"})
-    with pytest.raises(ValueError, match="DFET"):
-        from_dict({"method": "DFET", "settings": {"stages": 3}})
-
-
 # Derivatives and shapes
-
-
-@pytest.mark.parametrize("method", [DFET(2, 2), DFET(2, 1, control_order=2, basis="bernstein")])
-def test_derivatives_are_exact_and_sparse(method):
-    nlp = method.transcribe(oscillator())
-    z = propagated(nlp, k=1)[0] + 0.01
-    jacobian = nlp.functions.factory("J", ["z"], ["jac:g:z", "jac:F:z"])
-    exact = [np.array(J.full()) for J in jacobian(z)]
-    step = 1e-6
-    for matrix, k in zip(exact, (1, 0), strict=True):
-        difference = np.array(
-            [
-                (np.array(nlp.functions(z + step * e)[k]) - np.array(nlp.functions(z - step * e)[k])).ravel() / (2 * step)
-                for e in np.eye(len(z))
-            ]
-        ).T
-        assert np.abs(matrix - difference).max() < 1e-6 * max(1, np.abs(matrix).max())
-    assert nlp.functions.jac_sparsity(1, 0).density() < 50
 
 
 def test_batches_are_rows():
@@ -176,14 +82,6 @@ def test_batches_are_rows():
     assert np.array_equal(C, before) and np.array_equal(first[:, nlp.free], C)
     assert ((first >= nlp.lower) & (first <= nlp.upper)).all()
     assert np.array_equal(nlp.propagate(first)[:, nlp.free], C)
-
-
-def test_march_leaves_what_it_was_given_alone():
-    nlp = DFET(2, 3).transcribe(oscillator())
-    Z = nlp.first_guess(candidates(nlp, 2))
-    before = Z.copy()
-    nlp.propagate(Z), nlp.tighten(Z), nlp.evaluate(Z), nlp.unpack(Z[0])
-    assert np.array_equal(Z, before)
 
 
 def test_violations_name_what_is_violated():
@@ -248,33 +146,6 @@ def test_controls_may_have_another_order_than_states(method):
     assert (np.diff(phase.time) > 0).all()
 
 
-def test_fixed_things_are_no_variables():
-    problem, phase = integrator(bounds=(0.5, 0.5))
-    m = problem.parameter("m", bounds=(3, 3))
-    problem.minimize("cost", m * phase.final(phase["x"]))
-    nlp = DFET(2, 2).transcribe(problem)
-    assert len(nlp.free) == 0 and all(v.lower < v.upper for v in nlp.variables)
-    F, violation = nlp.evaluate(nlp.propagate(nlp.first_guess(np.empty((2, 0)))))
-    assert pytest.approx(np.full((2, 1), 3.0)) == F and violation.max() < 1e-14
-    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
-    assert flight.parameters == {"m": 3} and flight["run"]["u"] == pytest.approx(np.full(9, 0.5))
-
-
-def test_free_times_and_ranged_ends_are_variables_within_their_ranges():
-    problem, phase = integrator(t0=(0, 1), tf=(2, 3), initial=(-1, 1), final=(0.5, 2))
-    problem.minimize("time", phase.tf - phase.t0)
-    nlp = DFET(2, 1).transcribe(problem)
-    found = {v.name: (v.lower, v.upper) for v in nlp.variables}
-    assert found["run.t0"] == (0, 1) and found["run.tf"] == (2, 3)
-    assert found["run.x(t0)"] == (-1, 1) and found["run.x(tf)"] == (0.5, 2)
-    free = {nlp.variables[i].name for i in nlp.free}
-    assert {"run.t0", "run.tf", "run.x(t0)"} <= free and "run.x(tf)" not in free
-    phase = nlp.unpack(propagated(nlp, k=1)[0])["run"]
-    assert phase.edge_states[-1, 0] - phase.edge_states[0, 0] == pytest.approx(
-        np.sum([np.mean(phase.control.coefficients[j]) for j in range(2)]) * (phase.tf - phase.t0) / 2
-    )
-
-
 # Data
 
 
@@ -294,22 +165,3 @@ def test_tables_are_looked_up(kind):
     F, violation = nlp.evaluate(Z)
     assert F[0, 1] == pytest.approx(exact, rel=2e-3 if kind == "linear" else 1e-5)
     assert violation[0] < 1e-12
-
-
-def test_dynamics_without_derivatives_are_refused():
-    class Drag(ca.Callback):
-        def __init__(self):
-            ca.Callback.__init__(self)
-            self.construct("drag", {})
-
-        def eval(self, arguments):
-            return [0.1 * arguments[0] ** 2]
-
-    drag = Drag()
-    problem = Problem("braking")
-    phase = problem.phase("slide", t0=0, tf=(1, 2))
-    v = phase.state("v", bounds=(0, 10), initial=5)
-    phase.dynamics(v=-drag(v))
-    problem.minimize("speed", phase.final(v))
-    with pytest.raises(ValueError, match=r"phase 'slide'.*no derivatives.*enable_fd"):
-        DFET(2, 2).transcribe(problem)

@@ -6,15 +6,12 @@ import json
 
 import numpy as np
 import pytest
-from cases import candidates, integrator, oscillator, propagated, slot
-from test_contract import jump
+from cases import integrator, oscillator, propagated, slot
 
-from macs import MACS, Front, optimize
+from macs import optimize
 from problems import Problem
-from transcription import DFET, Smooth, from_dict
-from transcription.elements.phase import ElementsPhase
+from transcription import DFET
 from transcription.phases.mesh import PhaseMesh
-from transcription.phases.writer import PhaseWriter
 from transcription.trajectories.simulate import simulate
 
 EDGES, MOVING = (0.0, 0.1, 0.35, 0.6, 1.0), (1, 3)
@@ -60,7 +57,7 @@ def test_where_the_edges_are_the_equations_are_those_of_a_mesh_with_these_edges(
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
 def test_derivatives_by_the_edges_are_those_of_differences(basis, written_out, monkeypatch):
     if not written_out:
-        monkeypatch.setattr("transcription.elements.propagation.SMALL", 0)
+        monkeypatch.setattr("transcription.elements.propagation.MOST_UNKNOWNS", 0)
     nlp = moving(basis).transcribe(oscillator())
     (z,) = propagated(nlp, k=1)
     rows = np.arange(len(nlp.reduced.scale))
@@ -74,37 +71,11 @@ def test_derivatives_by_the_edges_are_those_of_differences(basis, written_out, m
     assert np.abs(derivatives[:, [list(nlp.free).index(slot(nlp, f"swing.edge[{j}]")) for j in MOVING]]).max() > 1e-2
 
 
-def test_derivatives_are_those_of_the_equations_in_linked_phases_with_imposed_ends(monkeypatch):
-    method = DFET(2, 2, mesh={"first": (EDGES, 2, 1, MOVING), "second": (EDGES, 3, None, (2,))})
-    problem = jump().compile()
-    own = method.transcribe(problem)
-    Z = own.propagate(own.first_guess(candidates(own, 3)))
-    rows = np.arange(len(own.reduced.scale))
-    derivatives = own.reduced.derivatives(own.reduced.propagate(Z), rows)
-    for name in ("propagate", "sensitivity"):
-        monkeypatch.setattr(ElementsPhase, name, getattr(PhaseWriter, name))
-    monkeypatch.setattr(ElementsPhase, "compilable", False)
-    plain = method.transcribe(problem)
-    again = plain.reduced.propagate(plain.first_guess(Z[:, plain.free]))
-    assert np.abs(again.Z - Z).max() < 1e-11
-    assert plain.reduced.derivatives(again, rows) == pytest.approx(derivatives, rel=1e-8, abs=1e-10)
-
-
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
 def test_a_trajectory_comes_back_from_its_own_mesh_with_its_edges(basis):
     nlp = moving(basis).transcribe(oscillator())
     for z in propagated(nlp):
         assert np.abs((nlp.interpolate(nlp.unpack(z)) - z) / nlp.span).max() < 1e-9
-
-
-def test_in_trajectories_of_other_meshes_the_edges_begin_where_the_mesh_has_them():
-    nlp = moving().transcribe(oscillator())
-    other = DFET(5, 3).transcribe(oscillator())
-    flight = other.unpack(propagated(other, k=1)[0])
-    z = nlp.interpolate(flight)
-    assert [z[slot(nlp, f"swing.edge[{j}]")] for j in MOVING] == [0.1, 0.6]
-    same = nlp.unpack(z)["swing"]
-    assert same.state(same.state.edges) == pytest.approx(flight["swing"].state(same.state.edges), abs=1e-10)
 
 
 def test_a_mesh_is_found_in_trajectories_of_its_own_only():
@@ -198,51 +169,6 @@ def test_a_constant_control_is_one_variable_on_its_arc():
         two[:, nlp.free[column]] += [-step, step]
         low, high = nlp.reduced.propagate(two).values
         assert derivatives[:, column] == pytest.approx((high - low) / (2 * step), rel=1e-5, abs=1e-5)
-
-
-def test_a_coarse_trajectory_is_constant_at_its_median():
-    coarse = DFET(5, 3).transcribe(oscillator())
-    z = coarse.propagate(coarse.first_guess(candidates(coarse, 1)))[0]
-    flight = coarse.unpack(z)
-    nlp = DFET(2, 2, mesh={"swing": PhaseMesh((0, 0.2, 1), 3, 2, (1,), {"u": (0,)})}).transcribe(oscillator())
-    own = flight["swing"].control.on_element(0, np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)]))[:, 0]
-    assert nlp.interpolate(flight)[slot(nlp, "swing.u[arc 0]")] == pytest.approx(np.median(own))
-
-
-@pytest.mark.parametrize("constant", [3, {"u": 3}, {"u": (3,)}, {"u": (0, 0)}, {"u": (-1,)}, "u"])
-def test_what_is_no_constant_control_is_refused(constant):
-    with pytest.raises(ValueError, match="DFET: phase 'swing'"):
-        DFET(2, 2, mesh={"swing": (EDGES, 3, 2, MOVING, constant)})
-
-
-def test_a_constant_control_that_the_phase_does_not_have_is_refused():
-    with pytest.raises(ValueError, match="phase 'swing' has no control 'w'; its controls are u, v"):
-        DFET(2, 2, mesh={"swing": (EDGES, 3, 2, MOVING, {"w": (0,)})}).transcribe(oscillator())
-
-
-@pytest.mark.slow
-def test_searches_begin_with_their_edges_and_files_keep_them(tmp_path):
-    method = DFET(2, 2, mesh={"run": ((0, 0.5, 1), 2, 0, (1,))})
-    problem = least_time()
-    drawn = Smooth().draw(problem, method, 20, np.random.default_rng(0))
-    nlp = method.transcribe(problem)
-    edge = list(nlp.free).index(slot(nlp, "run.edge[1]"))
-    assert ((nlp.lower[nlp.free[edge]] <= drawn[:, edge]) & (drawn[:, edge] <= nlp.upper[nlp.free[edge]])).all()
-    front = MACS(refine=False).solve(problem, method, evaluations=300, seed=1)
-    assert front[0].violation < 1e-6
-    front.save(tmp_path / "front.nc")
-    again = Front.load(tmp_path / "front.nc", problem=problem)
-    assert np.array_equal(again.decision, front.decision)
-    assert from_dict(again[0].transcription) == method == from_dict(json.loads(json.dumps(method.to_dict())))
-    edges = again[0].trajectory["run"].state.edges
-    assert edges[1] == pytest.approx(edges[-1] * again[0].decision[slot(nlp, "run.edge[1]")])
-    assert again[0].simulate().max_defect < 1e-8
-
-
-def test_a_candidate_that_is_no_number_is_no_error():
-    nlp = moving().transcribe(oscillator())
-    z = np.full(len(nlp.variables), np.nan)
-    assert np.isnan(nlp.unpack(z)["swing"].state.edges).any()
 
 
 def test_constant_controls_and_paths_and_peaks_follow_the_edges():

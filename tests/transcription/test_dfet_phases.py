@@ -112,18 +112,6 @@ def test_a_phase_of_no_duration_still_has_its_ends(second):
     assert (nlp.evaluate(z[None])[1][0] < 1e-12) == (second[1] >= second[0])
 
 
-def test_states_that_are_not_linked_may_jump():
-    nlp = DFET(2, 2).transcribe(relay(3, jump=1.5))
-    assert "constraint 'drop 0'" in nlp.g_labels
-    from cases import solved
-
-    found = solved(nlp)
-    assert set(found.status) == {"converged"}
-    flight = nlp.unpack(found.z[0])
-    assert flight["leg 0"]["m"][-1] - flight["leg 1"]["m"][0] == pytest.approx(1.5, abs=1e-5)
-    assert flight["leg 0"]["x"][-1] == flight["leg 1"]["x"][0]
-
-
 def test_several_phases_may_lead_into_one_declared_before_them():
     problem = Problem("meeting")
     together = problem.phase("together", t0=(0, 5), tf=6)
@@ -146,23 +134,6 @@ def test_several_phases_may_lead_into_one_declared_before_them():
     assert list(flight) == ["together", "left", "right"]
     assert flight["left"].tf == pytest.approx(flight["right"].tf, abs=1e-5) == flight["together"].t0
     assert flight["left"]["x"][-1] == pytest.approx(flight["right"]["x"][-1], abs=1e-4)
-
-
-def test_one_phase_may_lead_into_several():
-    problem = Problem("staging")
-    ends = {}
-    for name in ("stack", "orbiter", "booster"):
-        phase = problem.phase(name, t0=0 if name == "stack" else (0, 9), tf=(1, 9))
-        ends[name] = phase
-        phase.state("x", bounds=(-10, 10), initial=0 if name == "stack" else None)
-        phase.dynamics(x=phase.control("u", bounds=(-1, 1)))
-    problem.link(ends["stack"], ends["orbiter"])
-    problem.link(ends["stack"], ends["booster"])
-    problem.minimize("time", ends["orbiter"].tf + ends["booster"].tf)
-    nlp = DFET(2, 2).transcribe(problem)
-    flight = nlp.unpack(propagated(nlp, k=1)[0])
-    for name in ("orbiter", "booster"):
-        assert flight[name].t0 == pytest.approx(flight["stack"].tf) and flight[name]["x"][0] == flight["stack"]["x"][-1]
 
 
 def test_durations_are_rows_only_where_the_times_do_not_see_to_it():

@@ -1,11 +1,10 @@
 from __future__ import annotations
 
-import casadi as ca
 import numpy as np
 import pytest
 from cases import candidates, integrator, oscillator, propagated, slot
 
-from problems import Problem, load
+from problems import Problem
 from transcription import DFET
 
 # Guesses
@@ -44,13 +43,6 @@ def test_numbers_lines_and_samples_are_guesses():
     C = np.where(np.isnan(nlp.guess), 1.0, nlp.guess)[None]
     phase = nlp.unpack(nlp.first_guess(C)[0])["run"]
     assert phase.states[:, 0] == pytest.approx(phase.time, abs=1e-12)
-
-
-def test_guesses_are_taken_into_narrower_ranges():
-    nlp, found = guessed(x=(-5, 9))
-    assert found["run.x(t0)"] == -1
-    Z = nlp.first_guess(np.where(np.isnan(nlp.guess), 1.0, nlp.guess)[None])
-    assert Z[0, slot(nlp, "run.x(tf)")] == 4
 
 
 # Peaks
@@ -94,19 +86,6 @@ def test_tighten_sets_peaks_and_nothing_else():
     assert np.array_equal(nlp.tighten(loose), Z) and np.array_equal(nlp.tighten(low), Z)
 
 
-def test_a_peak_may_be_bounded_above():
-    from cases import solved
-
-    problem, phase = integrator(final=1)
-    problem.constraint("gentle", phase.peak(phase["u"]), upper=0.6)
-    problem.minimize("effort", phase.integral(phase["u"] ** 2))
-    nlp = DFET(3, 2, basis="bernstein").transcribe(problem)
-    found = solved(nlp, k=4)
-    assert set(found.status) == {"converged"}
-    for z in found.z:
-        assert nlp.unpack(z)["run"].at(np.linspace(0, 2, 200))["u"].max() < 0.6 + 0.03
-
-
 # Trajectories
 
 
@@ -141,46 +120,3 @@ def test_what_is_not_there_is_told():
         with pytest.raises(ValueError, match="swing"):
             phase.at(time)
     phase.at([phase.t0, phase.tf])
-
-
-def test_unpacking_takes_values_back_exactly():
-    nlp = DFET(2, 2).transcribe(load("goddard"))
-    z = nlp.first_guess(candidates(nlp, 1))[0]
-    phase = nlp.unpack(z)["ascent"]
-    assert phase.tf == z[slot(nlp, "ascent.tf")]
-    assert phase.control.coefficients[1, 2, 0] == z[slot(nlp, "ascent.u[1,2]")]
-    assert phase.edge_states[0].tolist() == [0, 0, 0, 0] and phase.edge_states[-1, 2] == 10
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("order", "control_order"), [(2, 2), (2, 5), (1, 8), (3, 6)])
-def test_states_between_nodes_are_as_accurate_with_controls_of_a_higher_order(order, control_order):
-    """x'' = -x from (1, 0): the error between the nodes is that of the collocation polynomial, of order l + 2, whatever the quadrature."""
-    errors = []
-    for elements in (4, 8):
-        problem = Problem("swing")
-        phase = problem.phase("swing", t0=0, tf=4)
-        x, v = phase.state("x", bounds=(-2, 2), initial=1), phase.state("v", bounds=(-2, 2), initial=0)
-        u = phase.control("u", bounds=(-1, 1))
-        phase.dynamics(x=v, v=-x + 0 * u)
-        problem.minimize("end", phase.final(x))
-        nlp = DFET(elements, order, control_order=control_order).transcribe(problem)
-        flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0])["swing"]
-        times = np.linspace(0, 4, 401)
-        errors.append(np.abs(flight.at(times)["x"] - np.cos(times)).max())
-    assert np.log2(errors[0] / errors[1]) > order + 1.3
-
-
-def test_the_scale_of_a_peak_does_not_hang_on_one_point():
-    """The size of exp(-h) in the middle of its box says nothing of its size: a taller box must not change the scale by orders."""
-    scales = []
-    for top in (10.0, 100.0):
-        problem = Problem("entry")
-        phase = problem.phase("fall", t0=0, tf=(1, 2))
-        h = phase.state("h", bounds=(0, top), initial=5)
-        phase.dynamics(h=-phase.control("sink", bounds=(0, 1)))
-        problem.minimize("heat", phase.peak(ca.exp(-h)))
-        nlp = DFET(2, 2).transcribe(problem)
-        scales.append(next(v.scale for v in nlp.variables if "peak" in v.name))
-    assert 0.5 < scales[0] <= 1.0
-    assert 0.5 < scales[1] <= 1.0

@@ -7,13 +7,13 @@ from dataclasses import dataclass, fields
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, integrator, oscillator, slot
+from cases import candidates, decay, integrator
 from scipy.optimize import minimize
 
 from macs import MACS
 from problems import Problem, load
 from transcription import DFET, InnerResult, InnerSolver
-from transcription.inner import Auto, Ipopt, Projection, Propagate, inner_solver
+from transcription.inner import Ipopt, inner_solver
 
 NAMES = ("auto", "propagate", "ipopt", "ipopt-feasibility")
 STATUSES = {"converged", "infeasible", "failed", "timeout"}
@@ -56,9 +56,7 @@ def broken() -> Problem:
 
 
 @pytest.mark.parametrize("inner", NAMES)
-@pytest.mark.parametrize(
-    "make", [hop, oscillator, lambda: load("goddard"), lambda: load("orbit_rise_full")], ids=["hop", "osc", "goddard", "rise"]
-)
+@pytest.mark.parametrize("make", [hop, lambda: load("goddard")], ids=["hop", "goddard"])
 def test_a_batch_comes_back_as_a_batch_and_means_what_it_says(inner, make):
     nlp = DFET(3, 2).transcribe(make())
     C = candidates(nlp, 4)
@@ -95,29 +93,8 @@ def test_the_projection_is_the_nearest_feasible_point(inner):
         assert moved == pytest.approx(np.linalg.norm(z[nlp.free] - c) / 2, rel=1e-9)
 
 
-def test_a_feasible_candidate_is_left_alone():
-    nlp = DFET(3, 1).transcribe(hop())
-    found = Ipopt().solve(nlp, np.full((1, 6), 0.5), nlp.propagate(nlp.first_guess(np.full((1, 6), 0.5))))
-    assert np.array_equal(found.z[0, nlp.free], np.full(6, 0.5)) and found.moved[0] == 0 and found.iterations[0] == 0
-
-
-def test_the_constant_objective_forgets_the_candidate_the_projection_does_not():
-    nlp = DFET(4, 6).transcribe(load("goddard"))
-    C = inner_solver("ipopt").solve(nlp, candidates(nlp, 3)).z[:, nlp.free]
-    near = np.clip(C + 0.01 * nlp.span[nlp.free], nlp.lower[nlp.free], nlp.upper[nlp.free])
-    projected, constant = (inner_solver(name).solve(nlp, near) for name in ("ipopt", "ipopt-feasibility"))
-    assert set(projected.status) == set(constant.status) == {"converged"}
-    assert projected.moved.max() < 0.1 < constant.moved.min()
-
-
-def test_random_candidates_of_goddard_converge():
-    nlp = DFET(4, 6).transcribe(load("goddard"))
-    found = inner_solver("auto").solve(nlp, candidates(nlp, 20))
-    assert set(found.status) == {"converged"} and found.violation.max() <= 1e-6
-
-
-@pytest.mark.parametrize("inner", ["auto", "ipopt", "ipopt-feasibility"])
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("inner", ["auto", "ipopt"])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
 def test_the_tolerance_is_kept(inner, tolerance):
     nlp = DFET(4, 3).transcribe(load("goddard"))
     found = inner_solver(inner).solve(nlp, candidates(nlp, 3), tolerance=tolerance)
@@ -135,13 +112,7 @@ def test_what_cannot_be_is_infeasible_and_says_why(inner):
         assert max(violations, key=violations.get) == "final value of run.x"
 
 
-def test_it_comes_as_near_as_it_can():
-    nlp = DFET(3, 2).transcribe(impossible())
-    found = inner_solver("ipopt").solve(nlp, candidates(nlp, 2))
-    assert found.violation == pytest.approx(np.full(2, 3 / 20), abs=1e-3), "full speed brings it to 2; the span of x is 20"
-
-
-@pytest.mark.parametrize("inner", NAMES)
+@pytest.mark.parametrize("inner", ["auto", "ipopt-feasibility"])
 def test_no_freedom_left(inner):
     """Fixed times, no control: there is nothing to choose, and the final value is right or wrong."""
     for final, feasible in ((np.exp(-1.0), True), (0.5, False)):
@@ -163,51 +134,7 @@ def test_dynamics_that_are_no_numbers_fail_and_are_never_feasible(inner, capfd):
     assert capfd.readouterr() == ("", ""), "the library does not print"
 
 
-def test_objectives_that_are_no_numbers_fail():
-    problem, phase = integrator()
-    x = phase["x"]
-    problem.minimize("root", phase.final(ca.sqrt(x)))
-    nlp = DFET(2, 1).transcribe(problem)
-    found = inner_solver("auto").solve(nlp, np.array([[-1.0] * 4, [1.0] * 4]))
-    assert found.status.tolist() == ["failed", "converged"]
-    assert np.isnan(found.F[0]).all() and found.F[1] == pytest.approx([np.sqrt(2)]) and np.isinf(found.violation[0])
-
-
-def test_march_equals_projection_where_every_candidate_is_feasible():
-    nlp = DFET(30, 1).transcribe(load("orbit_rise"))
-    C = candidates(nlp, 3)
-    propagated, projected, auto = (inner_solver(name).solve(nlp, C, tolerance=1e-9) for name in ("propagate", "ipopt", "auto"))
-    assert set(propagated.status) == set(projected.status) == {"converged"}
-    assert projected.z == pytest.approx(propagated.z, abs=1e-5) and pytest.approx(propagated.F, abs=1e-6) == projected.F
-    assert np.array_equal(auto.z, propagated.z) and propagated.violation.max() < 1e-12
-
-
-def test_auto_repairs_what_leaves_the_bounds_of_states():
-    problem, phase = integrator()
-    phase.state("y", bounds=(-0.5, 0.5), initial=0)
-    phase._rates = {}
-    phase.dynamics(x=phase["u"], y=phase["x"])
-    problem.minimize("end", phase.final(phase["x"]))
-    nlp = DFET(3, 2).transcribe(problem)
-    C = np.vstack([np.full(9, 0.1), np.ones(9)])
-    assert inner_solver("propagate").solve(nlp, C).status.tolist() == ["converged", "infeasible"]
-    found = inner_solver("auto").solve(nlp, C)
-    assert found.status.tolist() == ["converged", "converged"]
-    assert found.moved[0] < 1e-12 and found.moved[1] > 0.01 and found.z[0, nlp.free] == pytest.approx(C[0], abs=1e-12)
-
-
-def test_a_warm_start_keeps_its_states_and_saves_iterations():
-    nlp = DFET(4, 6).transcribe(load("goddard"))
-    first = inner_solver("ipopt").solve(nlp, candidates(nlp, 4))
-    C = first.z[:, nlp.free]
-    again = inner_solver("ipopt").solve(nlp, C, first.z)
-    assert np.array_equal(again.z, first.z) and not again.iterations.any() and not again.moved.any()
-    near = np.clip(C + 1e-3, nlp.lower[nlp.free], nlp.upper[nlp.free])
-    warm, cold = (inner_solver("ipopt").solve(nlp, near, start) for start in (first.z, None))
-    assert set(warm.status) == {"converged"} and warm.iterations.sum() <= cold.iterations.sum()
-
-
-@pytest.mark.parametrize("inner", NAMES)
+@pytest.mark.parametrize("inner", ["auto", "ipopt"])
 def test_results_do_not_depend_on_what_was_solved_before(inner):
     problem, solver = load("goddard"), inner_solver(inner)
     fresh, used = (DFET(3, 3).transcribe(problem) for _ in range(2))
@@ -256,32 +183,6 @@ def test_a_time_limit_gives_a_timeout():
     assert found.clocked
 
 
-def test_a_clock_that_ended_a_solve_is_told_even_if_the_point_is_feasible(monkeypatch):
-    nlp = DFET(4, 2).transcribe(load("goddard"))
-    good = Ipopt().solve(nlp, candidates(nlp, 1))
-    monkeypatch.setattr(Ipopt, "_solve_all", lambda self, nlp, start, guess, tolerance: (good.z, np.array(["timeout"]), np.ones(1, int)))
-    found = Ipopt().solve(nlp, candidates(nlp, 1))
-    assert found.status.tolist() == ["converged"]
-    assert found.clocked
-
-
-def test_an_iteration_limit_is_no_success():
-    nlp = DFET(4, 6).transcribe(load("goddard"))
-    found = Ipopt(max_iterations=1).solve(nlp, candidates(nlp, 2))
-    assert set(found.status) <= {"failed", "infeasible"}
-
-
-def test_peaks_are_tight_afterwards():
-    problem, phase = integrator(final=1)
-    problem.minimize("top", phase.peak(phase["u"]))
-    problem.constraint("gentle", phase.peak(phase["u"]), upper=0.9)
-    nlp = DFET(2, 2, basis="bernstein").transcribe(problem)
-    for inner in NAMES:
-        found = inner_solver(inner).solve(nlp, candidates(nlp, 3))
-        assert np.array_equal(nlp.tighten(found.z), found.z)
-        assert np.array_equal(found.F[:, 0], found.z[:, slot(nlp, "run.peak[0]")])
-
-
 def test_periodic_controls_are_projected_the_short_way_round():
     problem, phase = integrator(bounds=(-np.pi, np.pi), period=2 * np.pi, final=-1.9)
     phase._rates = {}
@@ -293,33 +194,7 @@ def test_periodic_controls_are_projected_the_short_way_round():
     assert ((found.z >= nlp.lower) & (found.z <= nlp.upper)).all()
 
 
-def test_dates_keep_their_digits():
-    """Times of the size of seconds since 1970, free within ten of them."""
-    now = 1.7e9
-    problem, phase = integrator(t0=(now, now + 10), tf=(now + 20, now + 30), final=5)
-    problem.minimize("time", phase.tf - phase.t0)
-    problem.minimize("effort", phase.integral(phase["u"] ** 2))
-    nlp = DFET(3, 2).transcribe(problem)
-    found = inner_solver("ipopt").solve(nlp, candidates(nlp, 10))
-    assert set(found.status) == {"converged"}
-
-
 # Names and strangers
-
-
-def test_inner_solvers_by_name():
-    assert (
-        isinstance(inner_solver("auto"), Auto)
-        and isinstance(inner_solver("projection"), Projection)
-        and isinstance(inner_solver("propagate"), Propagate)
-    )
-    own = Ipopt(max_iterations=5)
-    assert inner_solver(own) is own
-    for wrong in ("newton", "", None, 3, Propagate, ["auto"]):
-        with pytest.raises(ValueError, match="ipopt-feasibility"):
-            inner_solver(wrong)
-    with pytest.raises(ValueError, match="newton"):
-        MACS().solve(load("goddard"), DFET(2, 2), evaluations=5, inner="newton")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from cases import candidates, integrator
 from problems import Problem
 from transcription import DFET, NLP, InnerResult, InnerSolver
 from transcription.inner import Propagate, Whole, inner_solver, levels
-from transcription.inner.effort import evaluation, propagation
+from transcription.inner.base import evaluation_work, propagation_work
 
 
 def line() -> NLP:
@@ -35,7 +35,7 @@ def no_numbers() -> NLP:
 # Propagation alone, and none
 
 
-@pytest.mark.parametrize(("inner", "one"), [("propagate", propagation), ("none", evaluation)])
+@pytest.mark.parametrize(("inner", "one"), [("propagate", propagation_work), ("none", evaluation_work)])
 def test_each_candidate_takes_the_same_work_and_one_iteration(inner: str, one: Any) -> None:
     level = inner_solver(inner)
     program = level.program(line())

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import casadi as ca
 import numpy as np
 import pytest
-from cases import decay, oscillator, propagated
+from cases import oscillator, propagated
 from hypothesis import given
 from hypothesis import strategies as st
 
 from problems import Problem
 from transcription import DFET
-from transcription.meshes.adaptation import LAYERS, cuts, degrees, merged, next_method, pieces, refine, split
-from transcription.meshes.errors import decay_rates, phase_errors
-from transcription.meshes.growth import growth
-from transcription.meshes.scales import control_scales, objective_variations, own_scales, state_scales
-from transcription.meshes.verdict import Wanted, judge
+from transcription.meshes.errors import control_scales, decay_rates, own_scales, phase_errors, state_scales
+from transcription.meshes.refinement import LAYERS, cuts, merged, next_method, refine, split
+from transcription.meshes.verdict import Wanted, growth, judge
 from transcription.nlp.derivatives import gradients
 from transcription.numerics.polynomials import gauss_legendre, legendre_coefficients
 from transcription.trajectories.simulate import simulate, simulate_elements
@@ -96,10 +92,6 @@ def test_the_worst_elements_come_first_where_there_is_little_room():
     assert split(EDGES, {0: [0.0]}, most=3) is EDGES
 
 
-def test_degrees_are_what_the_rate_promises():
-    assert degrees(np.exp(8.0), 1.0) == 4 and degrees(0.1, 1.0) == 1 and degrees(9.0, 0.0) == np.inf
-
-
 # What it decides from
 
 
@@ -113,14 +105,6 @@ def test_decay_rates_are_those_of_the_function():
     assert rate(lambda t: 1 / (1.5 - t)) == pytest.approx(np.log(1.5 + np.sqrt(1.25)), abs=0.2)
     assert rate(np.abs) < 0.5 and rate(np.sign) < 0.3
     assert rate(lambda t: 2.0 + 0 * t) == np.inf
-
-
-def test_local_defects_are_those_of_the_single_elements():
-    nlp = DFET(1, 1, mesh={"fall": ((0, 0.5, 1), 0)}).transcribe(decay(tf=2.0)[0])
-    flight = nlp.unpack(propagated(nlp, k=1)[0])
-    found = errors(nlp, flight)
-    edges = flight["fall"].edge_states[:, 0]
-    assert found.defect == pytest.approx(np.abs(edges[:-1] * np.exp(-1.0) - edges[1:]) / np.ptp(edges), rel=1e-6)
 
 
 def test_quadrature_is_held_against_the_flight():
@@ -146,40 +130,10 @@ def test_quadrature_is_held_against_the_flight():
     assert confirming.elements >= 2 and confirming.order > 1, "where nothing is wrong, a mesh that has all of this one, and more"
 
 
-def test_a_peak_between_nodes_asks_for_its_element():
-    problem = Problem("hump")
-    phase = problem.phase("run", t0=0, tf=1)
-    x = phase.state("x", bounds=(0, 3), initial=0)
-    phase.dynamics(x=1)
-    problem.minimize("peak", phase.peak(ca.exp(-((20 * (x - 0.32)) ** 2))))
-    nlp = DFET(4, 1).transcribe(problem)
-    z = nlp.tighten(nlp.propagate(nlp.first_guess(np.empty((1, 0)))))[0]
-    verdict = assessed(nlp, z)
-    assert verdict.missed_by_elements > 0.1 and errors(nlp, nlp.unpack(z)).sums.tolist() == [0.0, 1.0, 0.0, 0.0]
-    finer = next_method(nlp.transcription, verdict, nlp.unpack(z)).mesh_of("run")
-    assert finer.elements > 4 and set(np.linspace(0, 1, 5)) - set(finer.edges) <= {0.75}, "nothing but the second one is cut"
-
-
-def test_controls_that_switch_are_found():
-    problem = Problem("switch")
-    phase = problem.phase("run", t0=0, tf=1)
-    phase.state("x", bounds=(-3, 3), initial=0)
-    u = phase.control("u", bounds=(-1, 1))
-    phase.dynamics(x=u)
-    problem.minimize("end", phase.final(phase["x"]))
-    nlp = DFET(1, 8, basis="bernstein").transcribe(problem)
-    names = [nlp.variables[i].name for i in nlp.free]
-    z = nlp.propagate(nlp.first_guess(np.array([[1.0 if i < 5 else -1.0 for i in range(len(names))]])))[0]
-    found = errors(nlp, nlp.unpack(z))
-    assert abs(found.steep[0] - 0.1) < 0.2
-    z = nlp.propagate(nlp.first_guess(np.linspace(-0.9, 0.9, len(names))[None]))[0]
-    assert np.isnan(errors(nlp, nlp.unpack(z)).steep[0])
-
-
 # Together
 
 
-@pytest.mark.parametrize("method", [DFET(2, 1), DFET(3, 4, control_order=2), DFET(2, 3, basis="bernstein")])
+@pytest.mark.parametrize("method", [DFET(2, 1), DFET(2, 3, basis="bernstein")])
 def test_trajectories_become_as_exact_as_wanted(method):
     """Flown anew on each mesh with the same controls: nothing is optimised, and errors fall all the same."""
     nlp = method.transcribe(oscillator())
@@ -196,21 +150,6 @@ def test_trajectories_become_as_exact_as_wanted(method):
     assert simulate(nlp.problem, nlp.unpack(z), rtol=1e-11, atol=1e-12).max_defect < 1e-6
 
 
-def test_controls_that_leave_their_bounds_are_written_by_what_bounds_them():
-    nlp = DFET(1, 2).transcribe(oscillator())
-    z = propagated(nlp, k=1)[0]
-    for i in nlp.free:
-        if ".u[" in nlp.variables[i].name:
-            z[i] = 1.0 if "[0,1]" in nlp.variables[i].name else -1.0
-    z = nlp.propagate(z[None])[0]
-    flight, verdict = nlp.unpack(z), assessed(nlp, z)
-    assert verdict.leaving > 0.01 and "a control leaves its bounds" in " ".join(verdict.complaints())
-    finer = next_method(DFET(1, 2), verdict, flight)
-    assert finer.basis == "bernstein"
-    again = finer.transcribe(nlp.problem)
-    assert assessed(again, again.interpolate(flight)).leaving == 0.0
-
-
 # What errors are measured by
 
 
@@ -219,8 +158,8 @@ def test_scales_are_what_a_quantity_does_not_its_bounds():
     assert own_scales(low, high, span) == pytest.approx([2.0, 1e-2, 1e-5, 3.0, 7.0])
 
 
-@pytest.mark.parametrize("wide", [1.0, 1e3])
-def test_errors_do_not_depend_on_the_width_of_bounds(wide):
+def test_errors_do_not_depend_on_the_width_of_bounds():
+    wide = 1e3
     problem = Problem("wide")
     phase = problem.phase("run", t0=0, tf=3)
     x = phase.state("x", bounds=(-5 * wide, 5 * wide), initial=1)
@@ -247,37 +186,7 @@ def test_errors_do_not_depend_on_the_width_of_bounds(wide):
     assert control_scales(flight["run"])[0] == pytest.approx(control_scales(other.unpack(same)["run"])[0])
 
 
-def test_an_objective_that_vanishes_has_a_size_all_the_same():
-    problem = Problem("miss")
-    phase = problem.phase("run", t0=0, tf=1)
-    x = phase.state("x", bounds=(-1e4, 1e4), initial=0)
-    u = phase.control("u", bounds=(-1e4, 1e4))
-    phase.dynamics(x=u)
-    problem.minimize("miss", (phase.final(x) - 1.5) ** 2)
-    nlp = DFET(2, 2).transcribe(problem)
-    z = nlp.propagate(nlp.first_guess(np.full((1, len(nlp.free)), 1.5)))[0]
-    assert nlp.evaluate(z[None])[0][0, 0] < 1e-20
-    assert 0.1 < objective_variations(nlp, z)[0] < 10.0, "the miss, had the state been another part of its way: not that of its bounds"
-
-
 # Orders of controls, and elements that become one
-
-
-def test_controls_of_a_low_order_get_a_higher_one_where_that_is_what_is_wrong():
-    method = DFET(4, 5, control_order=1)
-    nlp = method.transcribe(oscillator())
-    z = propagated(nlp, k=1)[0]
-    for i in nlp.free:
-        if ".u[" in nlp.variables[i].name:
-            j, k = nlp.variables[i].name.split("[")[1].rstrip("]").split(",")
-            z[i] = np.cos(int(j) + (-0.5, 0.5)[int(k)])
-    z = nlp.propagate(z[None])[0]
-    verdict = assessed(nlp, z)
-    finer = next_method(method, verdict, nlp.unpack(z))
-    assert finer.degree_of_controls(5, finer.mesh_of("swing").control_order) >= 3
-    simulated = replace(verdict, wanted=replace(verdict.wanted, confirmed=False))
-    assert verdict.scores()[0].controls.min() > 1.0 and simulated.scores()[0].controls.max() == 0.0, "what no simulation sees"
-    assert next_method(method, simulated, nlp.unpack(z)).mesh_of("swing").control_order is None
 
 
 def test_elements_are_merged_only_where_both_are_far_better_than_they_need_to_be():
@@ -289,10 +198,6 @@ def test_elements_are_merged_only_where_both_are_far_better_than_they_need_to_be
     assert merged(edges, 4, good, kept).tolist() == [True, True, False, True, False, True, True]
     assert merged(np.array([0.0, 0.01, 1.0]), 4, good[:2], kept[:3]).all(), "elements of very different lengths stay apart"
     assert merged(edges, 4, np.full(6, 1e-2), kept).all()
-
-
-def test_pieces_are_what_the_error_asks_for():
-    assert pieces(1.5, 5) == 2 and pieces(3.0**5 * 0.99, 5) == 3 and pieces(1e30, 5) == 4 and pieces(np.inf, 5) == 4
 
 
 # Growth

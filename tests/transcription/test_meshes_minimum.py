@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import casadi as ca
 import numpy as np
 import pytest
 
 from problems import Problem
 from transcription import DFET, Collocation, Meshed
-from transcription.meshes.adaptation import where_controls_gain
-from transcription.meshes.minimum import Optimum, gains
+from transcription.meshes.minimum import OptimumMultipliers, gains
+from transcription.meshes.refinement import where_controls_gain
 from transcription.meshes.verdict import Wanted, judge
 from transcription.nlp.scalarized import scalarize
 
@@ -24,7 +23,7 @@ def optimum(problem: Problem, method: Meshed, goal: int = 0):
     own = np.arange(m) == goal
     solved = scalarize(nlp, start, reference=np.where(own, 0.0, np.inf), weights=own.astype(float))
     assert solved.status == "converged"
-    found = Optimum.of(nlp, solved.z, solved.multipliers)
+    found = OptimumMultipliers.of(nlp, solved.z, solved.multipliers)
     trajectory = nlp.unpack(solved.z)
     return nlp, trajectory, found, judge(nlp.problem, trajectory, WANTED, solved.F, np.ones(m), found)
 
@@ -126,15 +125,3 @@ def test_a_constraint_on_an_integral_has_its_share_in_the_hamiltonian(method):
     _, trajectory, _, verdict = optimum(problem, method)
     assert trajectory["run"].edge_states[-1, 0] == pytest.approx(1.0, rel=1e-6)
     assert 0 <= verdict.gain < 1e-6
-
-
-def test_peaks_that_are_minimised_limit_what_controls_may_do():
-    """Least peak of |u| from 0 to 1 in one second: u = 1 all the time, and nothing else would gain."""
-    problem = Problem("least peak")
-    run = problem.phase("run", t0=0, tf=1)
-    run.state("x", bounds=(-2, 2), initial=0, final=1)
-    u = run.control("u", bounds=(-5, 5))
-    run.dynamics(x=u)
-    problem.minimize("peak", run.peak(ca.sqrt(u**2 + 1e-6)))
-    _, _, _, verdict = optimum(problem, DFET(4, 2))
-    assert verdict.gain == 0.0

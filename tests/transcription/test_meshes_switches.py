@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from transcription.meshes.switches import INSIDE, LOWER, UPPER, contacts, labels, stretches, switches
+from transcription.meshes.moving_edges import INSIDE, LOWER, UPPER, contacts, switches
 from transcription.numerics.polynomials import bernstein_matrix
 
 TAU = np.linspace(-1.0, 1.0, 65)
@@ -98,10 +96,6 @@ def test_a_hump_is_a_pulse_of_the_same_integral_about_its_middle():
     assert [one.place for one in dip] == pytest.approx([one.place for one in found], abs=0.2 / 64)
 
 
-def test_what_stays_near_a_bound_is_no_pulse():
-    assert not switches(*sampled(np.linspace(0, 1, 4), [[0, 0, 0], [0, 0.4, 0], [0, 0, 0]]))
-
-
 def test_a_smeared_beginning_and_end_are_switches_near_the_ends():
     found = switches(*sampled(np.linspace(0, 1, 5), [[0.6, 0.2, 0.0], [0, 0, 0], [0, 0, 0], [0, 0, 0.9]]))
     assert described(found) == [(UPPER, LOWER), (LOWER, UPPER)]
@@ -150,10 +144,3 @@ def test_contacts_begin_and_end():
     # A short gap in a contact is none.
     gap = np.where(np.abs(places - 0.5) < 0.02, 0.9, values)
     assert [one.place for one in contacts(places, gap, -5.0, 1.0)] == pytest.approx([one.place for one in found], abs=1e-3)
-
-
-def test_the_stretches_of_a_phase_follow_each_other():
-    parts = stretches(*sampled(np.linspace(0, 1, 4), [[1, 1], [1, 0], [0, 0]]))
-    assert [part.label for part in parts] == [UPPER, INSIDE, LOWER]
-    assert parts[0].start == 0 and parts[-1].end == 1 and all(a.end == b.start for a, b in pairwise(parts))
-    assert labels(np.array([-0.2, 0.0, 0.5, 1.0, 1.3])).tolist() == [LOWER, LOWER, INSIDE, UPPER, UPPER]

@@ -48,16 +48,6 @@ def test_what_is_out_of_reach_is_missed_by_least(method, end, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS, ids=repr)
-@settings(max_examples=20)
-@given(end=st.floats(-0.2, 0.2), seed=st.integers(0, 50))
-def test_what_is_in_reach_is_reached(method, end, seed):
-    nlp = method.nlp(walk(end))
-    solved = least_violation(nlp, started(nlp, seed))
-    assert solved.status == "converged" and solved.violation <= 1e-6 and solved.message == ""
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "method"), [("goddard", DFET(8, 3)), ("landing_site", Collocation(6, 3)), ("orbit_rise", DFET(20, 3))])
 def test_trajectories_are_found_from_anywhere(name, method):
     nlp = method.nlp(load(name))

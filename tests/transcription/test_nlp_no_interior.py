@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 import casadi as ca
@@ -67,7 +68,7 @@ def test_what_is_solved_to_a_useful_accuracy_has_not_failed(monkeypatch: pytest.
     problem.minimize("effort", phase.integral(x**2 + u**2))
     failed = solved(problem, "dfet:4x5", max_iterations=4, persistent=False)
     assert failed.status == "failed" and failed.message == "the limit of 4 iterations was reached"
-    monkeypatch.setattr(scalarized, "USEFUL", 1e-2)
+    monkeypatch.setattr(scalarized, "SOLVE", replace(scalarized.SOLVE, useful=1e-2))
     useful = solved(problem, "dfet:4x5", max_iterations=4, persistent=False)
     assert useful.status == "converged" and "the limit of 4 iterations" in useful.message and "optimality hold to" in useful.message
     assert abs(useful.F[0] - 1 / np.tanh(1)) < 1e-6

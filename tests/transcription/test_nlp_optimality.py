@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import casadi as ca
 import numpy as np
 import pytest
-from smooth_problems import corners, nlp_of, shuttle, slide, still, two_wells, vector
+from smooth_problems import nlp_of, shuttle, slide, still, two_wells, vector
 
-from problems import Problem, load
+from problems import load
 from transcription import DFET, NLP
 from transcription.inner import inner_solver
-from transcription.nlp.optimality import Conditions, optimality
+from transcription.nlp.optimality import optimality
 from transcription.nlp.scalarized import scalarize
 
 SPAN = 4.0
@@ -98,13 +97,6 @@ def test_one_objective_is_the_plain_condition() -> None:
     assert at(nlp, p=0.5) == pytest.approx(0.5 * 2)
 
 
-def test_three_objectives_inside_and_outside_their_triangle() -> None:
-    nlp = nlp_of(corners())
-    assert at(nlp, p0=0.2, p1=0.3, p2=0.5) == pytest.approx(0, abs=1e-12)
-    # The gradients are 2 (p - e_i): the least of their hull is twice the distance from the triangle, here that of its plane.
-    assert at(nlp, p0=0.3, p1=0.4, p2=0.5) == pytest.approx(2 * 0.2 / np.sqrt(3) * 3)
-
-
 def test_the_states_are_eliminated_by_their_adjoint() -> None:
     nlp = nlp_of(slide())
     for c in (0.05, 0.25, 0.5):
@@ -161,40 +153,3 @@ def test_peaks_have_the_multipliers_of_their_samples() -> None:
     moved = found.z[nlp.free] + 0.02 * nlp.span[nlp.free] * np.random.default_rng(0).normal(size=len(nlp.free))
     again = inner_solver("ipopt").solve(nlp, np.clip(moved, nlp.lower[nlp.free], nlp.upper[nlp.free])[None], found.z[None])
     assert again.status[0] == "converged" and optimality(nlp, again.z[0], ranges) > 1e-3
-
-
-def test_a_weakly_optimal_point_has_none_either() -> None:
-    # Time at its least value is optimal in the weak sense, whatever is made of it: the first order cannot tell. `payoff` can.
-    nlp = CASES["orbit_rise"][0].transcribe(load("orbit_rise"))
-    free = np.where(np.array([nlp.variables[i].name for i in nlp.free]) == "rise.tf", 20.0, 1.0)
-    z = nlp.propagate(nlp.first_guess(free[None]))
-    assert optimality(nlp, z[0], CASES["orbit_rise"][1]) == pytest.approx(0, abs=1e-9)
-
-
-def test_derivatives_that_are_no_numbers() -> None:
-    problem = Problem("root")
-    phase = problem.phase("wait", t0=0, tf=1)
-    x = phase.state("x", bounds=(-1, 1), initial=0)
-    phase.dynamics(x=0)
-    p = problem.parameter("p", bounds=(0, 1))
-    problem.minimize("f", ca.sqrt(p) + phase.final(x))
-    assert at(nlp_of(problem), p=0.0) == np.inf
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["skip", "goddard", "reentry_case1"])
-def test_states_may_be_eliminated_or_not(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Equations at the end are more than determine the states: the saddle point of all of them says the same.
-    problem = load(name)
-    nlp = DFET(6, 3).transcribe(problem.compile())
-    rng = np.random.default_rng(1)
-    z = nlp.propagate(nlp.first_guess(nlp.lower[nlp.free] + rng.random((1, len(nlp.free))) * nlp.span[nlp.free]))[0]
-    z = np.clip(np.where(np.isfinite(z), z, nlp.first_guess(z[None, nlp.free])[0]), nlp.lower, nlp.upper)
-    found = Conditions.of(nlp, z)
-    monkeypatch.setattr("transcription.nlp.optimality.BEYOND", -1)
-    whole = Conditions.of(nlp, z)
-    assert found is not None and whole is not None
-    size = np.abs(whole.reduced).max()
-    assert np.abs(found.reduced - whole.reduced).max() <= 1e-6 * size
-    assert not np.array_equal(found.reduced, whole.reduced)
-    assert found.residual == pytest.approx(whole.residual, rel=1e-6)

@@ -8,11 +8,10 @@ import casadi as ca
 import numpy as np
 import pytest
 from cases import slot
-from smooth_problems import bryson_denham, compass, nlp_of, shuttle, slide, still, two_wells, vector
+from smooth_problems import bryson_denham, nlp_of, shuttle, slide, still, two_wells, vector
 
-from problems import Problem
 from transcription import DFET, NLP
-from transcription.nlp.optimality import Conditions, Linearised, Multipliers, optimality
+from transcription.nlp.optimality import Conditions, Multipliers, optimality
 from transcription.nlp.scalarized import scalarize
 
 SMALLEST = DFET(1, 0)
@@ -136,13 +135,6 @@ def test_what_is_far_from_a_limit_has_no_multiplier() -> None:
         assert optimality(nlp, z, np.array([1.0])) == pytest.approx(4 * 10)
 
 
-def test_equations_are_not_among_the_inequalities() -> None:
-    nlp = plane((6.0, 15.0), lower=10.0, upper=10.0)
-    linear = Linearised.of(nlp, vector(nlp, p=0.0, q=2.0))
-    assert linear is not None and not any(one[nlp.g_lower == nlp.g_upper].any() for one in linear.near[2:])
-    assert len(linear.of_inequalities) == len(linear.slack) == 0
-
-
 def test_weights_of_two_objectives() -> None:
     nlp = nlp_of(two_wells(q=(0.5, 2.0)), SMALLEST)
     for p in (0.0, 0.2, 0.9):
@@ -175,21 +167,6 @@ def test_a_mixture_has_what_its_best_weights_leave() -> None:
         )
 
 
-@pytest.mark.parametrize("error", [RuntimeError, np.linalg.LinAlgError])
-def test_where_least_squares_find_nothing(error: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
-    nlp = nlp_of(two_wells(), SMALLEST)
-    z = vector(nlp, p=0.3, q=0.1)
-    conditions = Conditions.of(nlp, z)
-    assert conditions is not None
-
-    def fails(*_: Any, **__: Any) -> None:
-        raise error("too many iterations")
-
-    monkeypatch.setattr("transcription.nlp.optimality.nnls", fails)
-    assert optimality(nlp, z) == np.inf and conditions.residual_of(np.eye(2)) == np.inf
-    assert conditions.scaled is None and conditions.multipliers() is None
-
-
 # Where limits say the same, the multipliers are not unique.
 
 
@@ -205,22 +182,6 @@ def test_a_bound_of_a_free_variable_is_named_rather_than_a_row() -> None:
         assert multipliers.of_rows == pytest.approx(0, abs=1e-6)
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_bound_of_a_free_variable_is_named_rather_than_one_of_a_state(sign: int) -> None:
-    # Flown at the bound of u, x comes to its own: of the two that could bear the slope, it is u's.
-    problem = Problem("both bounds")
-    run = problem.phase("run", t0=0, tf=2)
-    x, u = run.state("x", bounds=(-1, 1), initial=0), run.control("u", bounds=(-0.5, 0.5))
-    run.dynamics(x=u)
-    problem.minimize("end", sign * run.final(x))
-    nlp = nlp_of(problem, SMALLEST)
-    z = vector(nlp, u=-0.5 * sign)
-    multipliers = check(nlp, z, np.array([1.0]))
-    assert np.isclose(np.abs(z), 1.0).any(), "a state is at its bound"
-    assert multipliers.of_bounds[nlp.free] == pytest.approx([-2 * sign], rel=1e-6)
-    assert np.delete(multipliers.of_bounds, nlp.free) == pytest.approx(0, abs=1e-6)
-
-
 @pytest.mark.parametrize("side", ["lower", "upper"])
 def test_rows_that_say_the_same_share(side: str) -> None:
     # The least squares of a + b = 6 are 3 and 3, those of a + 2 b = 6 are 6/5 and 12/5, of which the latter takes 24/5.
@@ -233,14 +194,6 @@ def test_rows_that_say_the_same_share(side: str) -> None:
         nlp = nlp_of(problem, SMALLEST)
         both = check(nlp, vector(nlp, p=1.0), np.array([1.0])).of_rows[[row(nlp, "constraint 'one'"), row(nlp, "constraint 'other'")]]
         assert np.abs(both) * [1, factor] == pytest.approx(shares, rel=1e-5)
-
-
-def test_the_end_of_the_box_of_a_periodic_control_is_no_bound() -> None:
-    # South of west, y falls further: a bound of u at pi would say that it cannot.
-    nlp = nlp_of(compass(), SMALLEST)
-    z = vector(nlp, u=np.pi)
-    assert optimality(nlp, z, np.array([np.inf, 1.0])) == pytest.approx(2 * 2 * np.pi)
-    assert not found(nlp, z, [np.inf, 1.0]).of_bounds.any()
 
 
 @pytest.mark.parametrize(

@@ -58,16 +58,6 @@ def test_an_imposed_end_takes_what_it_can(gain: float, u: float) -> None:
     assert (equations.T @ adjoint)[nlp.free] == pytest.approx(np.full(2, slope.mean()), rel=1e-9)
 
 
-def test_what_is_found_is_the_same_each_time() -> None:
-    problem, run = flight(final=0.0)
-    problem.minimize("effort", run.integral(run["u"] ** 2 + run["x"] * run["u"] * run.time))
-    nlp = nlp_of(problem, DFET(5, 4))
-    z = nlp.propagate(nlp.first_guess(np.random.default_rng(3).uniform(-1, 1, (1, len(nlp.free)))))[0]
-    first, again = Conditions.of(nlp, z), Conditions.of(nlp, z)
-    assert first is not None and again is not None
-    assert np.array_equal(first.reduced, again.reduced) and np.array_equal(first.adjoints, again.adjoints)
-
-
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("rate", [1.0, 3.0])
 def test_equations_that_determine_no_states_have_no_adjoint(rate: float, size: float) -> None:
@@ -78,13 +68,6 @@ def test_equations_that_determine_no_states_have_no_adjoint(rate: float, size: f
     nlp = nlp_of(problem, DFET(1, 0))
     residual = optimality(nlp, np.zeros(len(nlp.variables)), ONE / size)
     assert residual == np.inf if rate == 1.0 else 0 < residual < 10 * size
-
-
-def test_states_that_do_not_matter_need_not_be_determined() -> None:
-    problem, run = flight(rate=1.0)
-    problem.minimize("effort", run.integral(run["u"]))
-    nlp = nlp_of(problem, DFET(1, 0))
-    assert optimality(nlp, np.zeros(len(nlp.variables)), ONE) == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("elements", [2, 30])
@@ -146,13 +129,6 @@ def test_equations_that_follow_from_others_change_nothing() -> None:
     (s, _), (t, multipliers) = (steepest(identity(3), rows, gradients) for rows in (one, twice))
     assert t == pytest.approx(s, abs=1e-9) and s == pytest.approx(np.array([[0.5, -0.5], [-0.5, 0.5], [0, 3]]), abs=1e-9)
     assert twice.T @ multipliers == pytest.approx(gradients.T - t, abs=1e-9)
-
-
-def test_of_no_gradients_or_no_equations() -> None:
-    s, multipliers = steepest(identity(3), csr_matrix([[1.0, 1.0, 0.0]]), np.empty((0, 3)))
-    assert s.shape == (3, 0) and multipliers.shape == (1, 0)
-    s, multipliers = steepest(diags([1.0, 2.0, 4.0]), csr_matrix((0, 3)), np.eye(3))
-    assert s == pytest.approx(np.diag([1, 0.5, 0.25])) and multipliers.shape == (0, 3)
 
 
 def test_a_metric_of_nothing_is_refused() -> None:

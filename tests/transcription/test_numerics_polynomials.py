@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
-from scipy.interpolate import BarycentricInterpolator, BPoly
+from scipy.interpolate import BPoly
 
 from transcription.numerics import polynomials as pl
 
@@ -51,13 +51,6 @@ def test_lagrange_functions_are_one_at_their_own_node(basis, degree):
     assert pl.basis_matrix(basis, degree, near) == pytest.approx(np.eye(degree + 1), abs=1e-12)
 
 
-@given(st.integers(1, 30), st.integers(0, 2**32 - 1))
-def test_lagrange_agrees_with_scipy(degree, seed):
-    rng = np.random.default_rng(seed)
-    nodes, values, t = pl.nodes("lobatto", degree), rng.normal(size=degree + 1), rng.uniform(-1, 1, 7)
-    assert pl.basis_matrix("lobatto", degree, t) @ values == pytest.approx(BarycentricInterpolator(nodes, values)(t), abs=1e-8)
-
-
 @given(st.integers(0, 12), st.integers(0, 2**32 - 1))
 def test_bernstein_agrees_with_scipy(degree, seed):
     c, t = np.random.default_rng(seed).normal(size=degree + 1), np.linspace(-1, 1, 9)
@@ -79,28 +72,6 @@ def test_quadrature_is_exact_to_degree_2n_minus_1_and_no_further(n):
         exact = (1 - (-1) ** (degree + 1)) / (degree + 1)
         error = abs(weights @ nodes**degree - exact)
         assert error < 1e-14 if degree < 2 * n else error > 1e-10
-
-
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 7, 12, 33])
-def test_lobatto_nodes_are_those_of_lobatto(n):
-    nodes = pl.lobatto_nodes(n)
-    assert len(nodes) == n and nodes[0] == -1 and nodes[-1] == 1
-    legendre = np.polynomial.legendre.Legendre.basis(n - 1)
-    weights = 2 / (n * (n - 1) * legendre(nodes) ** 2)
-    for degree in range(2 * n - 2):
-        assert weights @ nodes**degree == pytest.approx((1 - (-1) ** (degree + 1)) / (degree + 1), abs=1e-12)
-
-
-def test_a_single_node_is_in_the_middle():
-    for basis in ("lobatto", "legendre", "bernstein"):
-        assert pl.nodes(basis, 0).tolist() == [0]
-        assert np.array_equal(pl.basis_matrix(basis, 0, np.array([-1, 0.3, 1])), np.ones((3, 1)))
-        assert np.array_equal(pl.basis_derivative(basis, 0, np.array([-1, 0.3, 1])), np.zeros((3, 1)))
-
-
-def test_nodes_cannot_be_altered_by_who_asks_for_them():
-    with pytest.raises(ValueError, match="read-only"):
-        pl.nodes("lobatto", 3)[0] = 5
 
 
 def test_unknown_bases_are_refused():

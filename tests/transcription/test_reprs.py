@@ -3,41 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from cases import oscillator
 
 from problems import load
-from transcription import DFET, Collocation, MultipleShooting, SingleShooting, Smooth, Trajectory
-from transcription.inner import Auto, Ipopt, Newton, inner_solver
+from transcription import DFET, Trajectory
+from transcription.inner import inner_solver
 from transcription.nlp.scalarized import scalarize
-from transcription.phases.mesh import PhaseMesh
 from transcription.trajectories.simulate import simulate
-
-
-@pytest.mark.parametrize(
-    ("settings", "text"),
-    [
-        (DFET(4, 6), "DFET(elements=4, order=6)"),
-        (DFET(4, 6, basis="bernstein", control_order=0), "DFET(elements=4, order=6, control_order=0, basis='bernstein')"),
-        (Collocation(10, 4), "Collocation(intervals=10, degree=4)"),
-        (Collocation(1, 9, points="gauss", control_order=2), "Collocation(intervals=1, degree=9, points='gauss', control_order=2)"),
-        (SingleShooting(9, steps=2), "SingleShooting(nodes=9, steps=2)"),
-        (MultipleShooting(3), "MultipleShooting(intervals=3)"),
-        (Smooth(spread=0.3), "Smooth(spread=0.3)"),
-        (Auto(), "Auto()"),
-        (Newton(max_iterations=7), "Newton(max_iterations=7)"),
-        (Ipopt(objective="constant"), "Ipopt(objective='constant')"),
-    ],
-    ids=str,
-)
-def test_settings_show_what_differs_from_their_defaults(settings, text):
-    assert repr(settings) == text and eval(text) == settings
-
-
-def test_a_mesh_is_not_shown_edge_by_edge():
-    mesh = PhaseMesh.uniform(40, 3)
-    assert repr(mesh) == "PhaseMesh(40 elements of order 3)"
-    assert repr(DFET(4, 6, mesh={"ascent": mesh})) == "DFET(elements=4, order=6, mesh=(('ascent', PhaseMesh(40 elements of order 3)),))"
 
 
 def test_what_is_computed_is_shown_in_a_line():

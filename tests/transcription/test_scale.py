@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import gc
 import tracemalloc
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
 
 from problems import load
 from runs.bench.scale.chains import masses, ride
 from transcription import parse
 from transcription.nlp.derivatives import gradients, hessian
 from transcription.numerics.batched import work
-from transcription.numerics.polynomials import lobatto_nodes
 from transcription.phases.mesh import PhaseMesh
 from transcription.shooting.control_law import ControlLaw
 from transcription.shooting.step import StepMesh
@@ -77,34 +74,3 @@ def test_controls_by_their_values_are_sparse(kind):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert power(entries) < ASKED and power(peaks) < ASKED
-
-
-@pytest.mark.slow
-def test_splines_found_by_parts_are_those_found_at_once():
-    """Over more than 512 pieces the weights of nodes far away, which count for nothing, are left out; also where pieces are uneven."""
-    rng = np.random.default_rng(0)
-    edges = np.cumsum(np.concatenate([[0.0], rng.uniform(0.3, 1.0, 1300)]))
-    mesh = PhaseMesh(tuple((edges / edges[-1]).tolist()), 3)
-    mesh = PhaseMesh((*mesh.edges[:-1], 1.0), 3)
-    steps = np.sort(np.concatenate([mesh.edges, 0.5 * np.add(mesh.edges[1:], mesh.edges[:-1])]))
-    found = ControlLaw("spline", mesh)._on_steps(steps).toarray()
-    places = (steps[:-1, None] + 0.5 * (1.0 + lobatto_nodes(4)) * np.diff(steps)[:, None]).ravel()
-    assert np.abs(found - CubicSpline(mesh.edges, np.eye(1301))(places).T).max() < 1e-11
-
-
-def test_steps_end_at_nodes_of_controls():
-    nodes = np.array([0.0, 0.1, 0.25, 0.5, 0.77, 1.0])
-    mesh = StepMesh.of(4, 2, nodes)
-    assert np.allclose(mesh.places, [0, 0.1, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.77, 0.875, 1])
-    assert mesh.ends.tolist() == [0, 3, 5, 7, 10]
-
-
-@pytest.mark.parametrize("on", [True, False])
-def test_the_collector_is_left_as_it_was(on):
-    before = gc.isenabled()
-    try:
-        (gc.enable if on else gc.disable)()
-        parse("dfet:4x3").transcribe(load("goddard").compile())
-        assert gc.isenabled() == on
-    finally:
-        (gc.enable if before else gc.disable)()

@@ -1,21 +1,17 @@
 from __future__ import annotations
 
-import pickle
-
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, integrator, oscillator, oscillator_rates, propagated, slot
+from cases import candidates, decay, integrator, oscillator, propagated, slot
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from macs import MACS, Front, optimize
+from macs import optimize
 from problems import Problem, load
 from problems.cases import goddard
-from transcription import DFET, MultipleShooting, SingleShooting, from_dict, parse
-from transcription import word as said
+from transcription import MultipleShooting, SingleShooting
 from transcription.base import largest
 from transcription.inner import inner_solver
 from transcription.shooting.runge_kutta import TABLEAUX
@@ -69,25 +65,7 @@ METHODS = [
 # The flight
 
 
-@pytest.mark.parametrize(("kind", "nodes"), [("constant", 4), ("linear", None), ("spline", 4), ("spline", None)])
-def test_a_flight_is_what_scipy_makes_of_the_same_controls(kind, nodes):
-    nlp = SingleShooting(12, scheme="rk8", steps=3, control=kind, control_nodes=nodes).transcribe(oscillator())
-    for z in propagated(nlp, 2):
-        t0, tf, m = (z[slot(nlp, name)] for name in ("swing.t0", "swing.tf", "m"))
-        u, v = (law(kind, t0, tf, values_of(nlp, z, name)) for name in ("swing.u", "swing.v"))
-        x, cost, kinks = np.array([z[slot(nlp, "swing.x(t0)")], 0.5]), 0.0, np.linspace(t0, tf, nodes or 12)
-
-        def rates(t, y, u=u, v=v, m=m, tf=tf):
-            return [*oscillator_rates(t, y[:2], np.array([u(t), v(t)]), m, tf), u(t) ** 2 + y[0] * y[1]]
-
-        for a, b in zip(kinks[:-1], kinks[1:] - 1e-13, strict=True):
-            *x, cost = solve_ivp(rates, (a, b), [*x, cost], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-        assert z[[slot(nlp, "swing.x(tf)"), slot(nlp, "swing.y(tf)")]] == pytest.approx(x, abs=2e-9)
-        F = nlp.evaluate(z[None])[0][0]
-        assert pytest.approx([cost, -x[0]], abs=2e-9) == F
-
-
-@pytest.mark.parametrize("scheme", TABLEAUX)
+@pytest.mark.parametrize("scheme", ["midpoint", "kutta3", "rk38", "rk8"])
 @pytest.mark.parametrize("method", [lambda n, **more: SingleShooting(n + 1, **more), MultipleShooting], ids=["single", "multiple"])
 def test_errors_of_states_and_integrals_fall_with_the_order(method, scheme):
     problem, phase = decay(tf=2.0)
@@ -124,10 +102,9 @@ def test_many_candidates_at_once_are_the_same_bits_as_one_by_one(method):
         assert np.array_equal(found[[0, 1, 63, 64, 100]], np.concatenate(singles))
 
 
-@pytest.mark.parametrize("period", [None, 2 * np.pi], ids=["plain", "periodic"])
 @pytest.mark.parametrize("method", METHODS, ids=str)
-def test_derivatives_of_the_reduced_problem(method, period):
-    nlp = method.transcribe(rich(period))
+def test_derivatives_of_the_reduced_problem(method):
+    nlp = method.transcribe(rich(period=2 * np.pi))
     reduced, Z = nlp.reduced, nlp.first_guess(candidates(nlp, 2, seed=4))
     rows = np.arange(len(reduced.lower))
     A = reduced.derivatives(reduced.propagate(Z), rows)
@@ -139,29 +116,6 @@ def test_derivatives_of_the_reduced_problem(method, period):
         moved[1][:, column] -= 1e-6
         slope = (reduced.propagate(moved[0]).values - reduced.propagate(moved[1]).values) / 2e-6
         assert np.allclose(A[:, :, k], slope, atol=2e-8), nlp.variables[column].name
-
-
-def test_dynamics_of_a_table_and_of_a_callback_fly_too():
-    """Which are no scalar operations, and of which the last one has no derivatives."""
-
-    class Wind(ca.Callback):
-        def __init__(self):
-            ca.Callback.__init__(self)
-            self.construct("wind", {})
-
-        def eval(self, arguments):
-            return [ca.sin(arguments[0])]
-
-    wind, times = Wind(), np.linspace(-1.0, 3.0, 400)
-    ends = []
-    for make in (ca.sin, ca.interpolant("table", "bspline", [times], np.sin(times)), wind):
-        problem, phase = integrator()
-        phase._rates = {}
-        phase.dynamics(x=make(phase.time) * phase["u"])
-        problem.minimize("end", phase.final(phase["x"]))
-        nlp = SingleShooting(9, control="linear").transcribe(problem)
-        ends.append(inner_solver("propagate").solve(nlp, candidates(nlp, 30)).F)
-    assert ends[1] == pytest.approx(ends[0], abs=1e-8) and ends[2] == pytest.approx(ends[0], abs=1e-14)
 
 
 # Meshes and controls
@@ -177,23 +131,7 @@ def test_no_step_leads_across_a_node_of_the_controls(intervals, steps, nodes):
     assert intervals * steps <= mesh.steps <= intervals * steps + nodes - 2
 
 
-@pytest.mark.slow
-@given(st.integers(2, 9), st.integers(2, 7), st.sampled_from(KINDS), st.integers(0, 10**6))
-@settings(max_examples=15, deadline=None)
-def test_the_integral_of_a_control_is_exact(nodes, control_nodes, kind, seed):
-    problem, phase = integrator()
-    problem.minimize("end", phase.final(phase["x"]))
-    nlp = SingleShooting(nodes, control=kind, control_nodes=control_nodes).transcribe(problem)
-    z = propagated(nlp, 1, seed)[0]
-    values = values_of(nlp, z, "run.u")
-    if kind == "spline":
-        exact = CubicSpline(np.linspace(0, 2, control_nodes), values).integrate(0, 2)
-    else:
-        exact = 2 * np.mean(values) if kind == "constant" else np.trapezoid(values, dx=2 / (control_nodes - 1))
-    assert z[slot(nlp, "run.x(tf)")] == pytest.approx(float(exact), abs=1e-12)
-
-
-@pytest.mark.parametrize("nodes", [2, 3, 4, 5, 11, 80])
+@pytest.mark.parametrize("nodes", [2, 5, 80])
 @pytest.mark.parametrize("kind", KINDS)
 def test_controls_are_what_scipy_makes_of_their_values(kind, nodes):
     problem, phase = integrator()
@@ -254,15 +192,6 @@ def test_paths_and_peaks_are_looked_at_at_nodes_and_where_asked_between(method):
     )
 
 
-def test_where_a_control_jumps_both_of_its_values_count():
-    problem, phase = integrator()
-    phase.path("thrust", phase["u"] * phase.time, upper=0.5)
-    problem.minimize("peak", phase.peak(phase["u"] * phase.time))
-    nlp = SingleShooting(3).transcribe(problem)
-    z = nlp.propagate(nlp.first_guess(np.array([[0.9, 0.0]])))
-    assert nlp.evaluate(z)[0][0, 0] == pytest.approx(0.9) and nlp.violations(z[0])["path 'thrust' of 'run'"] == pytest.approx(0.4)
-
-
 def test_bounds_of_states_hold_at_the_nodes():
     problem, phase = integrator()
     problem.minimize("end", phase.final(phase["x"]))
@@ -293,18 +222,11 @@ def test_goddard_against_its_closed_form():
     assert quick.objectives["flight time"] == pytest.approx(goddard.shortest_time(), rel=1e-3)
 
 
-def test_single_and_multiple_shooting_have_the_same_optimum():
-    problem = load("goddard")
-    found = [optimize(problem, method, objective="flight time", starts=1) for method in (SingleShooting(11), MultipleShooting(10))]
-    assert found[0].objectives["flight time"] == pytest.approx(found[1].objectives["flight time"], rel=1e-7)
-    assert np.array_equal([v.name for v in found[0].variables if ".u" in v.name], [v.name for v in found[1].variables if ".u" in v.name])
-
-
 def test_a_long_chain_is_not_written_out_for_derivatives(monkeypatch):
     from transcription.shooting import phase as shooting_phase
 
     plain = optimize(load("goddard"), SingleShooting(11), objective="flight time", starts=1)
-    monkeypatch.setattr(shooting_phase, "LONG", 0)
+    monkeypatch.setattr(shooting_phase, "LONGEST_CHAIN", 0)
     assert SingleShooting(11).transcribe(load("goddard")).functions.is_a("MXFunction")
     chained = optimize(load("goddard"), SingleShooting(11), objective="flight time", starts=1)
     assert chained.objectives["flight time"] == pytest.approx(plain.objectives["flight time"], rel=1e-9)
@@ -323,44 +245,10 @@ def test_the_inner_levels_find_feasible_flights(method, inner):
         assert found.moved == pytest.approx(other.moved, abs=2e-3)
 
 
-def two_legs() -> Problem:
-    """Up and along, then down: a mass is dropped between the legs; least effort to be at rest at (1, 0)."""
-    problem = Problem("legs")
-    drop = problem.parameter("drop", bounds=(0.1, 0.5))
-    first = problem.phase("first", t0=0, tf=(0.5, 1.5))
-    second = problem.phase("second", t0=(0.5, 1.5), tf=2.0)
-    for phase, ends in ((first, {"initial": 0}), (second, {"final": 0})):
-        phase.state("x", bounds=(-2, 3), **({"initial": 0} if phase is first else {"final": 1}))
-        v, u = phase.state("v", bounds=(-5, 5), **ends), phase.control("u", bounds=(-10, 10))
-        phase.dynamics(x=v, v=u - (drop if phase is second else 0) * v)
-    problem.link(first, second)
-    problem.minimize("effort", first.integral(first["u"] ** 2) + second.integral(second["u"] ** 2))
-    problem.maximize("drop", drop)
-    return problem
-
-
-@pytest.mark.slow
-def test_linked_phases_a_free_time_between_them_and_a_parameter():
-    found = [optimize(two_legs(), method, objective="effort", starts=1) for method in (MultipleShooting(12, control="linear"), DFET(4, 3))]
-    assert [point.status for point in found] == ["converged"] * 2
-    assert found[0].objectives["effort"] == pytest.approx(found[1].objectives["effort"], rel=1e-3)
-    flight = found[0].trajectory
-    assert flight["first"].tf == flight["second"].t0 and np.array_equal(flight["first"].edge_states[-1], flight["second"].edge_states[0])
-    assert found[0].simulate().max_defect < 1e-5
-    nlp = SingleShooting(9).transcribe(two_legs())
-    Z = propagated(nlp, 2)
-    for z in Z:
-        check = simulate(nlp.problem, nlp.unpack(z))
-        # Flown one after the other: what is imposed at the end is missed by what the flight says.
-        assert check.violations["final value of second.x"] == pytest.approx(
-            nlp.violations(z)["final value of second.x"], rel=1e-3, abs=1e-5
-        )
-
-
 # Trajectories
 
 
-@pytest.mark.parametrize(("kind", "scheme"), [*(("linear", scheme) for scheme in TABLEAUX), ("constant", "rk4"), ("spline", "rk8")])
+@pytest.mark.parametrize(("kind", "scheme"), [("linear", "euler"), ("linear", "rk8"), ("constant", "rk4"), ("spline", "rk8")])
 def test_a_trajectory_interpolates_with_the_order_of_its_scheme(kind, scheme):
     worst = []
     for n in (8, 16):
@@ -378,7 +266,7 @@ def test_a_trajectory_interpolates_with_the_order_of_its_scheme(kind, scheme):
     assert worst[1] < 3e-11 or np.log2(worst[0] / worst[1]) > order - 0.6
 
 
-@pytest.mark.parametrize("method", METHODS, ids=str)
+@pytest.mark.parametrize("method", METHODS[2:4], ids=str)
 def test_a_trajectory_comes_back_as_the_vector_it_was_made_of(method):
     problem = load("goddard")
     nlp = method.transcribe(problem)
@@ -386,103 +274,7 @@ def test_a_trajectory_comes_back_as_the_vector_it_was_made_of(method):
     assert nlp.interpolate(nlp.unpack(z)) == pytest.approx(z, abs=1e-9)
 
 
-@pytest.mark.slow
-def test_flights_go_from_one_method_to_another():
-    problem = load("goddard")
-    start = optimize(problem, DFET(4, 6), objective="horizontal speed", starts=1)
-    for method in (SingleShooting(41, control="linear"), MultipleShooting(20, control="spline"), MultipleShooting(30)):
-        nlp = method.transcribe(problem)
-        z = nlp.interpolate(start.trajectory)
-        assert nlp.evaluate(nlp.propagate(z[None]))[1][0] < 0.02
-        back = DFET(4, 6).transcribe(problem).interpolate(nlp.unpack(z))
-        assert np.abs(back - start.decision).max() < 0.2
-    again = optimize(problem, MultipleShooting(30), objective="horizontal speed", start=start, starts=1)
-    assert again.status == "converged" and again.objectives["horizontal speed"] == pytest.approx(0.9038897, rel=1e-4)
-
-
-@pytest.mark.slow
-def test_a_front_is_found_saved_and_loaded(tmp_path):
-    method = SingleShooting(11, control="linear")
-    front = MACS(agents=4, archive=4).solve(load("goddard"), method, evaluations=30, seed=1)
-    assert len(front) and (front.violation <= 1e-6).all() and "SingleShooting(nodes=11" in front.table()
-    front.save(tmp_path / "front.nc")
-    loaded = Front.load(tmp_path / "front.nc")
-    assert np.array_equal(loaded.objectives, front.objectives) and loaded[0].simulate().max_defect < 1e-3
-    times = np.linspace(0, loaded[0].trajectory["ascent"].tf, 33)
-    assert loaded[0].trajectory["ascent"].at(times)["y"] == pytest.approx(front[0].trajectory["ascent"].at(times)["y"], abs=1e-13)
-    assert from_dict(loaded[0].transcription) == method
-    propagated = MACS(agents=4, archive=4, refine=False).solve(load("goddard"), method, evaluations=40, seed=1, inner="propagate")
-    assert propagated.stats["evaluations"] == 40
-
-
 # Words and settings
-
-
-@pytest.mark.parametrize("method", METHODS, ids=str)
-def test_settings_pickle_and_come_back_from_plain_data(method):
-    assert pickle.loads(pickle.dumps(method)) == method == from_dict(method.to_dict())
-    assert eval(repr(method)) == method and hash(method) == hash(from_dict(method.to_dict()))
-
-
-@pytest.mark.parametrize(
-    ("word", "method"),
-    [
-        ("shooting:200", SingleShooting(200)),
-        ("shooting:200:linear", SingleShooting(200, control="linear")),
-        ("Shooting:20x4:rk8:spline:5", SingleShooting(20, steps=4, scheme="rk8", control="spline", control_nodes=5)),
-        ("multiple-shooting:40", MultipleShooting(40)),
-        ("multiple-shooting:40x2:heun", MultipleShooting(40, steps=2, scheme="heun")),
-        ("dfet:4x6:bernstein", DFET(4, 6, basis="bernstein")),
-        ("dfet:4x6:1", DFET(4, 6, control_order=1)),
-        ("dfet:40x2:bernstein:1", DFET(40, 2, control_order=1, basis="bernstein")),
-    ],
-)
-def test_words_of_the_command_line(word, method):
-    assert parse(word) == method == parse(said(method))
-
-
-def test_what_cannot_be_said_in_a_word():
-    assert said(SingleShooting(9, path_points=1)) is None and said(DFET(3, 2, mesh={"fly": ([0, 0.5, 1], 2)})) is None
-    assert said(SingleShooting(9)) == "shooting:9" and said(DFET(3, 2)) == "dfet:3x2"
-
-
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("shooting", "write it as shooting:200"),
-        ("shooting:4x", "write it as"),
-        ("shooting:a", "write it as"),
-        ("shooting:20:cubic", "'cubic' is given twice or unknown; there are constant, linear, spline; euler"),
-        ("shooting:20:linear:spline", "'spline' is given twice"),
-        ("shooting:1", "nodes must be a whole number of at least 2, not 1"),
-        ("multiple-shooting:0", "intervals must be a whole number of at least 1"),
-        ("dfet:4x6:lobatto:3:3", "write it as"),
-    ],
-)
-def test_words_that_mean_nothing(word, message):
-    with pytest.raises(ValueError, match=message):
-        parse(word)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: SingleShooting(1), "SingleShooting: nodes must be a whole number of at least 2, not 1"),
-        (lambda: SingleShooting(2.5), "SingleShooting: nodes must be a whole number"),
-        (lambda: MultipleShooting(True), "MultipleShooting: intervals must be a whole number of at least 1, not True"),
-        (lambda: MultipleShooting(3, steps=0), "MultipleShooting: steps must be a whole number of at least 1, not 0"),
-        (lambda: SingleShooting(9, control_nodes=1), "SingleShooting: control_nodes must be a whole number of at least 2, not 1"),
-        (lambda: SingleShooting(9, path_points=-1), "SingleShooting: path_points must be a whole number of at least 0, not -1"),
-        (
-            lambda: SingleShooting(9, scheme="rk5"),
-            f"SingleShooting: scheme must be one of {', '.join(map(repr, TABLEAUX))}, not 'rk5'",
-        ),
-        (lambda: SingleShooting(9, control="cubic"), "SingleShooting: control must be one of 'constant', 'linear', 'spline', not 'cubic'"),
-    ],
-)
-def test_settings_that_make_no_sense(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
 
 
 # Steps that are too long
@@ -515,11 +307,6 @@ def test_a_lag_that_the_step_cannot_follow_is_refused(scheme, limit):
         enough = int(next(word for word in words if word.startswith(f"{cure}=")).split("=")[1])
         type(method)(enough, scheme=scheme).transcribe(lag(1.6 * limit / 2))
         type(method)(51, scheme=scheme, steps=int(words[-1].split("=")[1])).transcribe(lag(1.6 * limit / 2))
-
-
-def test_a_lag_that_no_step_in_reach_can_follow_is_refused():
-    with pytest.raises(ValueError, match=r"too long for 'y', .*; take far shorter ones"):
-        SingleShooting(51).transcribe(lag(1e6))
 
 
 def test_what_may_be_stable_is_not_refused():

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import pickle
-
 import numpy as np
 import pytest
-from cases import candidates, decay, integrator, oscillator, oscillator_rates, propagated, slot
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from cases import candidates, oscillator, oscillator_rates, propagated, slot
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from macs import Front, optimize
+from macs import optimize
 from problems import Problem, load
-from transcription import DFET, Meshed, MultipleShooting, from_dict
-from transcription import word as said
-from transcription.phases.mesh import PhaseMesh
+from transcription import MultipleShooting
 from transcription.shooting.runge_kutta import TABLEAUX
 from transcription.trajectories.simulate import simulate
 
 EDGES = (0.0, 0.1, 0.15, 0.4, 0.5, 0.9, 1.0)
-KINDS = [("constant", None), ("linear", None), ("spline", None), ("constant", 4), ("linear", 10), ("spline", 4)]
+KINDS = [("constant", None), ("linear", 10), ("spline", 4)]
 
 
 def image(places: np.ndarray, edges=EDGES) -> np.ndarray:
@@ -48,7 +42,7 @@ def on(edges=EDGES, **more) -> MultipleShooting:
 
 
 @pytest.mark.parametrize(("kind", "nodes"), KINDS)
-@pytest.mark.parametrize("count", [5, 6, 49])
+@pytest.mark.parametrize("count", [6, 49])
 def test_a_mesh_of_equal_intervals_is_the_same_bits(kind, nodes, count):
     more = {"control": kind, "control_nodes": nodes, "steps": 3}
     plain = MultipleShooting(count, **more).transcribe(oscillator())
@@ -96,42 +90,6 @@ def test_derivatives_of_the_reduced_problem(kind, nodes):
         assert np.allclose(A[:, :, k], slope, atol=2e-8), nlp.variables[column].name
 
 
-@pytest.mark.slow
-@given(
-    st.lists(st.floats(0.02, 1.0), min_size=1, max_size=8),
-    st.integers(1, 3),
-    st.sampled_from([None, 2, 3, 5, 9]),
-    st.sampled_from(["constant", "linear", "spline"]),
-)
-@settings(max_examples=25, deadline=None)
-def test_the_integral_of_a_control_is_exact(lengths, steps, nodes, kind):
-    edges = np.append(0.0, np.cumsum(lengths))
-    edges = tuple((edges / edges[-1]).tolist())
-    problem, phase = integrator()
-    problem.minimize("end", phase.final(phase["x"]))
-    method = MultipleShooting(1, mesh={"run": (edges, 4)}, steps=steps, control=kind, control_nodes=nodes)
-    nlp = method.transcribe(problem)
-    z = propagated(nlp, 1)[0]
-    kinks, values = 2.0 * image(np.linspace(0, 1, nodes or len(edges)), edges), values_of(nlp, z, "run.u")
-    if kind == "spline":
-        exact = CubicSpline(kinks, values).integrate(0, 2)
-    else:
-        exact = values @ np.diff(kinks) if kind == "constant" else np.trapezoid(values, kinks)
-    assert z[slot(nlp, "run.x(tf)")] == pytest.approx(float(exact), abs=1e-11)
-
-
-@pytest.mark.parametrize("scheme", ["euler", "heun", "rk4"])
-def test_errors_fall_with_the_order_on_graded_intervals(scheme):
-    problem, _ = decay(tf=2.0)
-    problem.parameter("idle", bounds=(0, 1))
-    errors = []
-    for n in (20, 40):
-        edges = tuple((np.linspace(0, 1, n + 1) ** 1.5).tolist())
-        nlp = MultipleShooting(1, scheme=scheme, mesh={"fall": (edges, TABLEAUX[scheme].order)}).transcribe(problem)
-        errors.append(abs(nlp.propagate_and_score(np.zeros((1, len(nlp.variables))))[1][0, 0] - np.exp(-2)))
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(TABLEAUX[scheme].order, abs=0.3)
-
-
 def test_each_phase_has_a_mesh_of_its_own():
     problem = Problem("legs")
     first, second = problem.phase("first", t0=0, tf=(0.5, 1.5)), problem.phase("second", t0=(0.5, 1.5), tf=2.0)
@@ -150,59 +108,7 @@ def test_each_phase_has_a_mesh_of_its_own():
     assert (flight["second"].state.edges - flight["second"].t0) / (2.0 - flight["second"].t0) == pytest.approx(EDGES, abs=1e-12)
 
 
-@pytest.mark.slow
-def test_the_optimum_of_the_ascent_on_other_intervals(tmp_path):
-    """Linear tangent steering at 250 s: 0.903889755358877 km/s, a closed form."""
-    edges = tuple((0.5 * (np.linspace(0, 1, 41) + np.linspace(0, 1, 41) ** 2)).tolist())
-    method = MultipleShooting(40, control="linear", mesh={"ascent": (edges, 4)})
-    point = optimize(load("goddard"), method, objective="horizontal speed", starts=1)
-    assert point.verified and point.objectives["horizontal speed"] == pytest.approx(0.903889755358877, abs=1e-5)
-    start = optimize(load("goddard"), DFET(4, 6), objective="horizontal speed", starts=1)
-    again = optimize(
-        load("goddard"),
-        method,
-        objective="horizontal speed",
-        start=method.nlp(load("goddard")).interpolate(start.trajectory)[None],
-        starts=1,
-    )
-    assert again.objectives["horizontal speed"] == pytest.approx(point.objectives["horizontal speed"], abs=1e-7)
-    Front.of(point.alone()).save(tmp_path / "front.nc")
-    loaded = Front.load(tmp_path / "front.nc")
-    assert from_dict(loaded[0].transcription) == method and np.array_equal(loaded[0].decision, point.decision)
-    assert loaded[0].simulate().max_defect == point.simulate().max_defect
-
-
 # Settings
-
-
-def test_data_and_back():
-    method = MultipleShooting(3, steps=2, mesh={"run": (EDGES, 4), "a": [(0.0, 0.3, 1.0), 4]})
-    assert isinstance(method, Meshed) and (method.elements, method.order) == (3, 4)
-    assert method.mesh_of("run").elements == 6 and method.mesh_of("other") == PhaseMesh.uniform(3, 4)
-    assert from_dict(method.to_dict()) == method == pickle.loads(pickle.dumps(method)) and hash(from_dict(method.to_dict())) == hash(method)
-    assert said(method) is None and said(MultipleShooting(3, mesh={})) == "multiple-shooting:3"
-    assert from_dict({"method": "MultipleShooting", "settings": {"intervals": 3}}) == MultipleShooting(3), "files from before meshes"
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: on((0.0, 0.7, 0.7, 1.0)), "MultipleShooting: phase 'swing': edges of a mesh must increase from 0 to 1"),
-        (lambda: MultipleShooting(3, mesh={"swing": (EDGES, 2)}), "phase 'swing': on a mesh for rk4 the order is 4, not 2"),
-        (lambda: MultipleShooting(3, mesh={"swing": (EDGES, 4, 2)}), "phase 'swing': the order of its controls cannot be chosen"),
-        (lambda: MultipleShooting(3, mesh={"swing": (EDGES, 4, None, (2,))}), "phase 'swing': the edges of its elements cannot move"),
-        (lambda: MultipleShooting(3, mesh={"leg": (EDGES, 4)}).transcribe(oscillator()), "a mesh is given for phase 'leg'; the phases of"),
-    ],
-)
-def test_meshes_that_make_no_sense(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
-
-
-def test_controls_that_leave_their_bounds_become_straight_lines():
-    spline = MultipleShooting(3, control="spline")
-    assert spline.remeshed({}, bounded=True).control == "linear"
-    assert spline.remeshed({}).control == "spline" and MultipleShooting(3).remeshed({}, bounded=True).control == "constant"
 
 
 # Steps that are too long
@@ -228,14 +134,6 @@ def test_the_longest_step_decides():
     assert not method.suits(lag(1.0).compile()) and method.suits(lag(0.03).compile())
     # Rates of 0.1: 7.55 decays in one step are multiplied by 80, which is not yet certain to be wrong.
     method.transcribe(lag(0.1))
-
-
-def test_what_grows_on_some_steps_and_decays_on_others_is_refused_for_what_it_grows():
-    """Forty steps of 2 s, each of which doubles a mode, or more, then two hundred that damp it."""
-    edges = tuple(np.concatenate([np.linspace(0, 0.8, 41), np.linspace(0.8, 1, 201)[1:]]).tolist())
-    with pytest.raises(ValueError, match="steps of 2 s are too long for 'y'"):
-        MultipleShooting(1, mesh={"turn": (edges, 4)}).transcribe(lag(1.6))
-    MultipleShooting(1, mesh={"turn": (edges, 4)}).transcribe(lag(1.3))
 
 
 def test_where_the_guess_is_not_the_trajectory_long_steps_may_be_right():

@@ -58,25 +58,6 @@ def test_all_conditions_of_the_order_hold_and_those_of_the_next_do_not(name):
     assert misses(name, order + 1) > 1e-6
 
 
-@pytest.mark.parametrize("name", TABLEAUX)
-def test_the_conditions_as_the_paper_prints_them(name):
-    """Table I of Chai et al.: with c_i the sums of a_ij over j and d_j the sums of b_i a_ij over i."""
-    method = TABLEAUX[name]
-    A, b, c = method.matrix, np.array(method.b), np.array(method.c)
-    d = b @ A
-    conditions = [
-        [(b.sum(), 1)],
-        [(d.sum(), 1 / 2)],
-        [(b @ c**2, 1 / 3), (d @ c, 1 / 6)],
-        [(b @ c**3, 1 / 4), (d @ c**2, 1 / 12), ((b * c) @ A @ c, 1 / 8), (d @ A @ c, 1 / 24)],
-    ]
-    for met in conditions[: method.order]:
-        for found, wanted in met:
-            assert found == pytest.approx(wanted, abs=1e-15)
-    if method.order < 4:
-        assert not all(found == pytest.approx(wanted, abs=1e-6) for found, wanted in conditions[method.order])
-
-
 def propagated(name: str, n: int) -> np.ndarray:
     """The error after n steps from 0 to 2 of an equation whose solution is (exp(sin t), cos t)."""
 

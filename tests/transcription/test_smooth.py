@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import tracemalloc
-
 import numpy as np
 import pytest
 
-from macs import MACS, MOPSO, NSGA2
+from macs import NSGA2
 from problems import Problem
 from transcription import DFET, Smooth
 from transcription.smooth import smoothed, smoothing
@@ -90,13 +88,6 @@ def test_without_a_guess_they_vary_about_the_middle() -> None:
     assert X[:, columns(nlp, "throttle")].mean(axis=0) == pytest.approx(1, abs=0.02)
 
 
-def test_the_generator_is_the_only_source_of_chance() -> None:
-    problem, mesh = climb(**GUESS), DFET(3, 2)
-    first, again, other = (Smooth().draw(problem, mesh, 5, np.random.default_rng(seed)) for seed in (1, 1, 2))
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-
-
 @pytest.mark.parametrize("settings", [{"spread": 0}, {"spread": 1.5}, {"length": -1}, {"length": "long"}, {"spread": True}, {"guess": 1}])
 def test_settings_that_make_no_sense(settings) -> None:
     with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be"):
@@ -114,60 +105,7 @@ def test_profiles_at_many_places_are_those_of_the_whole_matrix() -> None:
     assert np.array_equal(smoothed(noise[:, ::4], few, 0.2), noise[:, ::4] @ smoothing(few, 0.2).T)
 
 
-def test_profiles_at_many_places_take_memory_in_proportion() -> None:
-    peaks = []
-    for count in (4000, 8000):
-        tracemalloc.start()
-        smoothed(np.zeros((1, count)), np.linspace(0.0, 1.0, count), 0.2)
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-    assert peaks[1] < 2.3 * peaks[0]
-
-
 # Solvers that begin with them
-
-
-SOLVERS = [MACS(agents=4, archive=6), NSGA2(population=8), MOPSO(particles=8)]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
-def test_every_solver_begins_with_them(solver, monkeypatch) -> None:
-    from macs.evaluation.bilevel import Bilevel
-
-    batches, mesh = [], DFET(10, 2)
-    inside = Bilevel._evaluate
-    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z, way=None: (batches.append(Z.copy()), inside(self, Z, way))[1])
-    nlp = mesh.transcribe(climb(**GUESS))
-
-    def roughness(start) -> float:
-        batches.clear()
-        solver.solve(climb(**GUESS), mesh, evaluations=12, seed=1, start=start, inner="propagate")
-        first = np.vstack(batches)[:, nlp.free]
-        assert np.array_equal(first[0][np.isfinite(nlp.guess)], nlp.guess[np.isfinite(nlp.guess)])  # the guess itself comes first
-        return float(np.abs(np.diff(first[1 : min(len(batches[0]), 6), nlp.profiles[0].columns], axis=1)).mean())
-
-    assert roughness("smooth") < 0.5 * roughness(None)
-    assert roughness(Smooth(spread=0.01)) < 0.1 * roughness(None)
-
-
-@pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
-@pytest.mark.parametrize("start", ["uniform", Smooth(guess=False)], ids=str)
-def test_a_guess_may_be_left_out(solver, start, monkeypatch) -> None:
-    from macs.evaluation.bilevel import Bilevel
-
-    nlp, first = DFET(4, 2).transcribe(climb(**GUESS)), []
-    inside = Bilevel._evaluate
-    monkeypatch.setattr(Bilevel, "_evaluate", lambda self, Z, way=None: (first.append(Z.copy()), inside(self, Z, way))[1])
-    solver.solve(climb(**GUESS), DFET(4, 2), evaluations=8, seed=1, start=start, inner="propagate")
-    throttle = nlp.profiles[0].columns
-    assert not np.isclose(np.vstack(first)[:, nlp.free][:, throttle], nlp.guess[throttle]).all(axis=1).any()
-
-
-def test_an_array_of_them_is_a_start_too() -> None:
-    problem, mesh = climb(**GUESS), DFET(4, 2)
-    start = Smooth().draw(problem, mesh, 8, np.random.default_rng(3))
-    assert len(NSGA2(population=8).solve(problem, mesh, evaluations=16, seed=1, start=start, inner="propagate"))
 
 
 def test_an_unknown_start_is_refused_before_any_work() -> None:
@@ -175,14 +113,3 @@ def test_an_unknown_start_is_refused_before_any_work() -> None:
         NSGA2().solve(climb(), DFET(4, 2), evaluations=100, start="smoth")
     with pytest.raises(ValueError, match="start must be a Front, Points or an array"):
         NSGA2().minimize(lambda X: X, [(0, 1)] * 2, evaluations=100, start="smooth")
-
-
-def test_a_checkpoint_belongs_to_its_start(tmp_path) -> None:
-    given = {"evaluations": 24, "seed": 1, "inner": "propagate", "checkpoint": tmp_path / "run.ckpt"}
-    solver, mesh = MOPSO(particles=8), DFET(4, 2)
-    solver.solve(climb(**GUESS), mesh, start="smooth", callback=lambda progress: True, **given)
-    with pytest.raises(ValueError, match="first candidates"):
-        solver.solve(climb(**GUESS), mesh, **given)
-    front = solver.solve(climb(**GUESS), mesh, start="smooth", **given)
-    whole = solver.solve(climb(**GUESS), mesh, start="smooth", **{**given, "checkpoint": None})
-    assert front.F.tobytes() == whole.F.tobytes()

@@ -42,30 +42,6 @@ def test_a_flight_without_controls_has_its_closed_form(method):
     assert check.max_defect < 1e-6 and check.violation < 1e-9
 
 
-def test_evaluations_of_one_integration_are_limited_not_those_of_several(monkeypatch):
-    problem, _phase = decay(tf=1.5)
-    nlp = DFET(2, 3).transcribe(problem)
-    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])["fall"]
-    along = arcs.Arcs.of(nlp.problem.phases[0], [(flight, 0, np.zeros(0))])
-    y = flight.edge_states[:1]
-    found = along.integrate(y, 1e-9, np.full(1, 1e-9), "DOP853")
-    monkeypatch.setattr(arcs, "MOST_CALLS", 200)
-    assert all(np.array_equal(along.integrate(y, 1e-9, np.full(1, 1e-9), "DOP853"), found) for _ in range(10))
-    monkeypatch.setattr(arcs, "MOST_CALLS", 10)
-    assert np.isnan(along.integrate(y, 1e-9, np.full(1, 1e-9), "DOP853")).all()
-
-
-def test_an_exact_trajectory_has_no_defect():
-    problem, phase = integrator()
-    problem.minimize("end", phase.final(phase["x"]))
-    nlp = DFET(3, 4, basis="bernstein").transcribe(problem)
-    for z in propagated(nlp):
-        check = simulated(nlp, z, rtol=1e-12, atol=1e-14)
-        assert check.max_defect < 1e-12 and check.violation == 0
-        F, _ = nlp.evaluate(z[None])
-        assert check.objectives["end"] == pytest.approx(F[0, 0], abs=1e-10)
-
-
 def test_the_defect_is_that_of_the_mesh():
     problem, _phase = decay(tf=2.0)
     nlp = DFET(2, 0).transcribe(problem)
@@ -93,17 +69,6 @@ def test_a_tampered_control_is_found(element):
     assert false.violation > 1e-3 and max(false.violations, key=false.violations.get).startswith(
         ("final value of ascent.", "bounds of ascent.")
     )
-
-
-@pytest.mark.slow
-def test_objectives_and_violations_are_those_of_the_transcription():
-    nlp = DFET(4, 8).transcribe(oscillator())
-    C = candidates(nlp, 1)
-    C[0, 4:] = 0.3
-    z = nlp.propagate(nlp.first_guess(C))[0]
-    check, F = simulated(nlp, z), nlp.evaluate(z[None])[0][0]
-    assert list(check.objectives.values()) == pytest.approx((F * nlp.problem.signs).tolist(), rel=1e-8)
-    assert set(check.defect) == {"swing"} and set(check.defect["swing"]) == {"x", "y"}
 
 
 def test_violations_of_paths_constraints_bounds_and_ends_are_named():
@@ -161,29 +126,6 @@ def test_linked_phases_are_simulated_from_where_the_first_ended():
     assert other.defect["leg 1"]["x"] > 1e-3 and other.violations["constraint 'drop'"] > 1e-3
 
 
-def test_a_meeting_that_does_not_take_place_is_found():
-    problem = Problem("meeting")
-    together = problem.phase("together", t0=(1, 5), tf=6)
-    x = together.state("x", bounds=(-10, 10))
-    together.dynamics(x=0)
-    for name, start in (("left", -1), ("right", 1)):
-        phase = problem.phase(name, t0=0, tf=(1, 5))
-        phase.state("x", bounds=(-10, 10), initial=start)
-        phase.dynamics(x=phase.control("u", bounds=(-1, 1)))
-        problem.link(phase, together)
-    problem.minimize("place", together.final(x))
-    nlp = DFET(2, 2, basis="bernstein").transcribe(problem)
-    good, bad = solved(nlp, k=1).z[0], propagated(nlp, k=1)[0]
-    assert simulated(nlp, good).violation < 1e-5
-    check = simulated(nlp, bad)
-    flight = nlp.unpack(bad)
-    assert check.violations["link from 'right' to 'together': x"] == pytest.approx(
-        abs(flight["right"]["x"][-1] - flight["left"]["x"][-1]) / 20, rel=1e-6
-    )
-    assert check.violations["link from 'right' to 'together': t0"] == pytest.approx(abs(flight["right"].tf - flight["left"].tf) / 4)
-    assert check.violation == pytest.approx(nlp.evaluate(bad[None])[1][0], rel=1e-6)
-
-
 def test_a_phase_of_no_duration_is_simulated():
     problem = Problem("coast")
     burn = problem.phase("burn", t0=0, tf=(1, 3))
@@ -216,17 +158,6 @@ def test_a_phase_that_ends_before_it_begins_by_a_tolerance_has_its_values():
 
 
 # Trouble
-
-
-def test_stiff_dynamics_have_their_methods():
-    problem = Problem("stiff")
-    phase = problem.phase("run", t0=0, tf=1)
-    x = phase.state("x", bounds=(-2, 2), initial=1)
-    phase.dynamics(x=-1e5 * (x - ca.cos(phase.time)))
-    problem.minimize("end", phase.final(x))
-    nlp = DFET(4, 3).transcribe(problem)
-    z = nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0]
-    assert simulated(nlp, z, rtol=1e-8, method="Radau").objectives["end"] == pytest.approx(np.cos(1), abs=1e-4)
 
 
 @pytest.mark.slow
@@ -276,17 +207,6 @@ def test_dynamics_that_break_down_are_an_infinite_defect(method, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_unstable_dynamics_are_simulated_as_far_as_they_go():
-    problem = Problem("blow up")
-    phase = problem.phase("run", t0=0, tf=2)
-    x = phase.state("x", bounds=(-100, 100), initial=1)
-    phase.dynamics(x=x**2)
-    problem.minimize("end", phase.final(x))
-    nlp = DFET(4, 3).transcribe(problem)
-    check = simulated(nlp, nlp.first_guess(np.empty((1, 0)))[0])
-    assert check.max_defect == np.inf
-
-
 @pytest.mark.parametrize(
     "options", [{"method": "Euler"}, {"method": None}, {"method": "rk45"}, {"rtol": 0}, {"rtol": -1}, {"atol": 0}, {"atol": np.nan}]
 )
@@ -296,12 +216,6 @@ def test_bad_settings_are_refused(options):
     z = nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0]
     with pytest.raises(ValueError, match=next(iter(options))):
         simulated(nlp, z, **options)
-
-
-def test_a_tighter_tolerance_than_arithmetic_allows_is_met_as_well_as_can_be():
-    problem, _ = decay()
-    nlp = DFET(2, 5).transcribe(problem)
-    assert simulated(nlp, nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0], rtol=1e-16, atol=1e-16).max_defect < 1e-9
 
 
 # Between nodes
@@ -330,42 +244,6 @@ def test_bernstein_does_not_overshoot():
     nlp, z = overshooting("bernstein")
     assert excursions(nlp.problem, nlp.unpack(z)) == {}
     assert simulated(nlp, z).violation == 0
-
-
-def test_periodic_controls_and_missing_controls_have_no_excursions():
-    problem, phase = integrator(bounds=(-np.pi, np.pi), period=2 * np.pi)
-    phase._rates = {}
-    phase.dynamics(x=ca.cos(phase["u"]))
-    problem.minimize("end", phase.final(phase["x"]))
-    nlp = DFET(1, 3).transcribe(problem)
-    z = nlp.propagate(nlp.first_guess(np.array([[3, -3, 3.1, -2.5]])))[0]
-    assert excursions(nlp.problem, nlp.unpack(z)) == {}
-    assert simulated(nlp, z).max_defect < 1e-3
-    problem, _ = decay()
-    nlp = DFET(1, 3).transcribe(problem)
-    assert excursions(nlp.problem, nlp.unpack(nlp.propagate(nlp.first_guess(np.array([[1.5]])))[0])) == {}
-
-
-def test_what_was_simulated_is_a_trajectory():
-    nlp = DFET(3, 3).transcribe(oscillator())
-    flight = simulated(nlp, propagated(nlp, k=1)[0]).trajectory
-    phase = flight["swing"]
-    assert list(flight) == ["swing"] and set(flight.parameters) == {"m"}
-    assert (np.diff(phase.time) >= 0).all()
-    assert set(phase.at(0.7)) == {"x", "y", "u", "v"}
-    assert phase["x"].shape == phase.time.shape == phase["u"].shape
-    assert phase.at(phase.time)["x"] == pytest.approx(phase["x"], abs=1e-9)
-
-
-def test_simulations_leave_no_trace_in_each_other():
-    nlp = DFET(3, 3).transcribe(oscillator())
-    first, second = (nlp.unpack(z) for z in propagated(nlp, k=2))
-    alone = simulate(nlp.problem, first)
-    simulate(nlp.problem, second)
-    again = simulate(nlp.problem, first)
-    assert alone.objectives == again.objectives and alone.defect == again.defect
-    with np.errstate(all="raise"):
-        simulate(nlp.problem, first)
 
 
 # Several at once
@@ -412,36 +290,6 @@ def test_one_that_breaks_down_takes_no_other_with_it():
             assert check.objectives["area"] == pytest.approx(-np.log(1 - x0 * tf), rel=1e-7)
         else:
             assert not np.isfinite(check.objectives["area"]) and check.max_defect == np.inf and check.violation == np.inf
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["Radau", "LSODA"])
-def test_several_by_an_implicit_method(method):
-    nlp = DFET(4, 4).transcribe(oscillator())
-    flights = [nlp.unpack(z) for z in nlp.propagate(nlp.first_guess(candidates(nlp, 2)))]
-    for flight, check in zip(flights, simulate_all(nlp.problem, flights, method=method), strict=True):
-        assert check.objectives == pytest.approx(simulate(nlp.problem, flight).objectives, rel=1e-5)
-
-
-def test_a_control_that_leaves_its_bounds_between_nodes_violates_them():
-    """A parabola through values inside the bounds at its three nodes, with its top outside."""
-    problem, phase = integrator()
-    problem.minimize("end", phase.final(phase["x"]))
-    nlp = DFET(1, 2).transcribe(problem)
-    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0])
-    (name,) = flight
-    law = flight[name].control
-    bound = flight[name].control_variables[0]
-    outside = bound.upper + 0.05 * bound.span
-
-    def raised(coefficients):
-        places = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
-        coefficients[0, :, 0] = outside - 0.5 * (places - 0.4) ** 2 * bound.span
-        assert ((bound.lower <= coefficients) & (coefficients <= bound.upper)).all()
-        return coefficients
-
-    check = simulate(nlp.problem, tampered(flight, name, raised))
-    assert law.basis == "legendre" and check.violations[f"bounds of {name}.{bound.name}"] == pytest.approx(0.05, abs=1e-3)
 
 
 @pytest.mark.parametrize("place", [0.137, 0.51, 0.866])

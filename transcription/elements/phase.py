@@ -2,22 +2,63 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from abc import abstractmethod
+from functools import cache, cached_property
 
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase, Variable
+from problems.compiled import CompiledPhase, CompiledProblem, Variable
+from problems.problem import Problem
 
-from ..numerics.periodic import unwrapped, unwrapped_law, wrapped, wrapped_controls
+from ..assembly import Assembly
+from ..base import NLP
+from ..meshed import Meshed
 from ..numerics.polynomials import gauss_legendre
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
-from ..phases.writer import Ends, PhaseWriter, Rows, Written
-from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
-from .points import at_place, rates_and_integrands, times_half_length
+from ..phases.rows import EndSlots, Rows, Written
+from ..phases.writer import PhaseWriter, unwrapped_law, wrapped_controls
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, unwrapped, wrapped
 from .propagation import Propagation
 from .tables import Tables
+
+
+def rates_and_integrands(phase: CompiledPhase) -> ca.Function:
+    """(x, u, place, share, s) -> (rates and integrands times half of the element's length; sizes); place and share are the phase's."""
+    x, u, place, share, s = _symbols(phase)
+    half, along = 0.5 * share * (s[1] - s[0]), (x, u, s[0] + place * (s[1] - s[0]), s)
+    values = [half * phase.dynamics(*along), half * phase.integrands(*along), phase.sizes(*along)]
+    return ca.Function("inside", [x, u, place, share, s], values)
+
+
+def at_place(function: ca.Function, chosen: list[int], phase: CompiledPhase) -> ca.Function:
+    """(x, u, place, s) -> some rows of what a Function of a phase returns at this place, relative to the phase."""
+    x, u, place, _, s = _symbols(phase)
+    return ca.Function(function.name(), [x, u, place, s], [function(x, u, s[0] + place * (s[1] - s[0]), s)[chosen]])
+
+
+def times_half_length(phase: CompiledPhase, size: int) -> ca.Function:
+    """(values, share, s) -> values times half of the length of an element with this share of the phase."""
+    values, (_, _, _, share, s) = ca.MX.sym("values", size), _symbols(phase)
+    return ca.Function("weighted", [values, share, s], [0.5 * share * (s[1] - s[0]) * values])
+
+
+def need_derivatives(phase: CompiledPhase, method: str) -> None:
+    """Raise ValueError if the dynamics have no derivatives: implicit equations cannot be solved without."""
+    try:
+        phase.dynamics.jacobian()
+    except RuntimeError:
+        raise ValueError(
+            f"{method}: phase '{phase.name}': the dynamics have no derivatives; give their Callback a Jacobian, "
+            "or its option 'enable_fd': True"
+        ) from None
+
+
+def _symbols(phase: CompiledPhase) -> list[ca.MX]:
+    """Symbols of x, u, place, share and s at one point."""
+    sizes = {"x": len(phase.states), "u": len(phase.controls), "place": 1, "share": 1, "s": phase.dynamics.size1_in(3)}
+    return [ca.MX.sym(name, size) for name, size in sizes.items()]
 
 
 class ElementsPhase(PhaseWriter):
@@ -29,7 +70,7 @@ class ElementsPhase(PhaseWriter):
 
     affine = True
 
-    def __init__(self, mesh: PhaseMesh, tables: Tables, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
+    def __init__(self, mesh: PhaseMesh, tables: Tables, phase: CompiledPhase, layout: Layout, ends: EndSlots) -> None:
         super().__init__(phase, layout, ends)
         self.mesh, self.tables = mesh, tables
         self.n = elements = mesh.elements
@@ -72,11 +113,9 @@ class ElementsPhase(PhaseWriter):
 
     @property
     def compilable(self) -> bool:  # type: ignore[override]
-        """See `PhaseWriter.compilable`."""
         return self._propagation.quick
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
-        """See `PhaseWriter.write`."""
         phase, tables, pick = self.phase, self.tables, self.layout.pick
         X, B = pick(extended, self.X), pick(extended, self.B)
         left, right = B[:, :-1], B[:, 1:]
@@ -153,30 +192,25 @@ class ElementsPhase(PhaseWriter):
         return ca.vertcat(*entries)
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `PhaseWriter.state_nodes`."""
         return np.vstack([self.B[1:], self.X.reshape(-1, self.B.shape[1])]), self._state_places(self.mesh)
 
     def state_places(self, extended: np.ndarray) -> np.ndarray:
-        """See `PhaseWriter.state_places`."""
         return self._state_places(self.mesh.found_in(self._edges(extended)))
 
     def _state_places(self, mesh: PhaseMesh) -> np.ndarray:
         return np.concatenate([mesh.edges[1:], mesh.inside(self.tables.nodes).ravel()])
 
     def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `PhaseWriter.control_nodes`."""
         share = self.mesh.inside(self.tables.control_nodes).ravel()
         return self.U.reshape(len(share), len(self.phase.controls)), share
 
     def propagate(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """See `PhaseWriter.propagate`."""
         initial = self.layout.pick(extended, self.ends.initial)
         right, X, residual = self._propagation.elements(robust)(initial, *self._inputs(extended))
         extended = self.layout.replaced(extended, np.concatenate([self.X.ravel(), self.B[1:].ravel()]), ca.veccat(X, right))
         return extended, right[:, -1], residual.T
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
-        """See `PhaseWriter.sensitivity`."""
         n, nx, pick = self.n, len(self.phase.states), self.layout.pick
         left, X, inputs = pick(extended, self.B[:-1]), pick(extended, self.X), self._inputs(extended)
         right = self._propagated_right(extended, left[:, -1], inputs)
@@ -192,8 +226,7 @@ class ElementsPhase(PhaseWriter):
         return self.layout.replaced(S, np.concatenate(slots), ca.vertcat(*values)), edges[n]
 
     def _propagated_right(self, extended: ca.MX, left: ca.MX, inputs: tuple[ca.MX, ...]) -> ca.MX:
-        """States (nx, N) at the right ends; the last one propagated anew, from its left end, where dynamics are evaluated there and values
-        are imposed: an extended vector has these, not those that propagation gives."""
+        """States (nx, N) at the right ends; the last one propagated where values are imposed on it and dynamics are evaluated there."""
         right = self.layout.pick(extended, self.B[1:])
         if not self.tables.needs_right or (self.ends.final >= 0).all():
             return right
@@ -216,10 +249,7 @@ class ElementsPhase(PhaseWriter):
         return places + self.n * (ca.sparsify(ca.DM(self.mesh.shares)) @ moved).T
 
     def _outer(self, extended: ca.MX) -> list[ca.DM | ca.MX]:
-        """Derivatives (nu (q + 1) + 2 + len(s), d) of the controls, the start, the length and s of each element by the free variables.
-
-        Controls and s are free variables or constants, and so are the times; only where edges move do starts and lengths depend on where.
-        """
+        """Derivatives (nu (q + 1) + 2 + len(s), d) of each element's controls, start, length and s by the free variables."""
         seeds, length = self.layout.seeds(), ca.diff(self.layout.pick(extended, self.ends.statics)[:2])
         statics, *controls = (seeds[(slots.ravel() % seeds.shape[0]).tolist(), :] for slots in (self.ends.statics, *self.U))
         mean, places = (statics[1, :] - statics[0, :]) / self.n, self._places(extended)
@@ -232,12 +262,12 @@ class ElementsPhase(PhaseWriter):
         return [ca.vertcat(controls[j], starts[j], lengths[j], statics) for j in range(self.n)]
 
     def guess_controls(self, t0: float, tf: float) -> dict[int, float]:
-        """See `PhaseWriter.guess_controls`; edges that move begin where the mesh has them."""
+        """Edges that move begin where the mesh has them."""
         edges = dict(zip(self.E.tolist(), self._begin.tolist(), strict=True))
         return edges | super().guess_controls(t0, tf)
 
     def interpolate(self, extended: np.ndarray, trajectory: PhaseTrajectory) -> None:
-        """See `PhaseWriter.interpolate`; edges that move are where they are in a trajectory of this mesh, else where the mesh has them."""
+        """Edges that move are where they are in a trajectory of this mesh, else where the mesh has them."""
         phase, tables, t0, length = self.phase, self.tables, trajectory.t0, trajectory.tf - trajectory.t0
         mesh = self.mesh.found_in(trajectory.state.edges)
         # Between the ends of this mesh's elements, where a control may jump: Gauss-Legendre nodes never meet them.
@@ -264,16 +294,51 @@ class ElementsPhase(PhaseWriter):
         return t0 + (tf - t0) * places / self.n
 
     def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial | None:
-        """See `PhaseWriter.costates`."""
         if self.tables.costates is None:
             return None
         of_rows = multipliers.reshape(self.n, self.tables.rows, -1)
         return PiecewisePolynomial(self._edges(extended), self.tables.costates @ of_rows, self.tables.costate_basis)
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
-        """See `PhaseWriter.unpack`."""
         phase, tables, edges = self.phase, self.tables, self._edges(extended)
         control = PiecewisePolynomial(edges, unwrapped(extended[self.U], phase.controls), tables.control_basis)
         B = extended[self.B]
         closed = np.concatenate([B[:-1, None], tables.at_stages @ extended[self.X], B[1:, None]], axis=1)
         return self.trajectory(extended, tables.points[:-1], PiecewisePolynomial(edges, closed, tables.closed), control)
+
+
+class ElementsMethod(Meshed):
+    """A method that writes phases on elements, of any degree of the controls, by its own `tables`: what DFET and collocation share."""
+
+    orders_controls = True
+    moves_edges = True
+    control_order: int | None
+
+    @abstractmethod
+    def tables(self, order: int, control_order: int) -> Tables:
+        """The element with states and controls of these degrees."""
+
+    def degree_of_controls(self, order: int, own: int | None = None) -> int:
+        """The degree of controls on a mesh whose own one is `own`, where states have degree `order`."""
+        return next((q for q in (own, self.control_order) if q is not None), self.most_control_order(order))
+
+    @classmethod
+    def options_of(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> tuple[int | None, str]:
+        """The degree of the controls, if any, and the other word, or "", among the options of a word with two numbers."""
+        orders, words = [int(one) for one in options if one.isdecimal()], [one for one in options if not one.isdecimal()]
+        if len(numbers) != 2 or len(orders) > 1 or len(words) > 1:
+            raise ValueError(f"write it as {cls.examples}")
+        return orders[0] if orders else None, words[0] if words else ""
+
+    def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
+        """Write `problem` as an NLP; see `Transcription.transcribe`."""
+        compiled, tables = problem.compile(), cache(self.tables)
+        self.check_phases(compiled)
+        for phase in compiled.phases:
+            need_derivatives(phase, type(self).__name__)
+
+        def writer(phase: CompiledPhase, layout: Layout, ends: EndSlots) -> ElementsPhase:
+            mesh = self.mesh_of(phase.name)
+            return ElementsPhase(mesh, tables(mesh.order, self.degree_of_controls(mesh.order, mesh.control_order)), phase, layout, ends)
+
+        return Assembly(compiled, writer).nlp(self)

@@ -16,16 +16,65 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from ..numerics.batched import expanded
-from ..numerics.elimination import eliminate
-from ..numerics.periodic import unwrapped_law, wrapped_controls
+from ..phases.writer import unwrapped_law, wrapped_controls
 from .tables import Tables
 
-ITERATIONS = 30
-TOLERANCE = 1e-14
-WRITTEN_OUT = 5
-"""Newton steps that are written out, after an explicit guess."""
-SMALL, SHORT = 48, 30_000
-"""Most unknowns, and most instructions, of an element whose Newton steps are written out."""
+Row = dict[int, Any]
+MOST_UNKNOWNS = 48
+"""Of an element whose Newton steps are written out."""
+
+
+def eliminate(matrix: ca.SX, right: ca.SX) -> ca.SX:
+    """The solution of `matrix` x = `right` as an expression.
+
+    Gaussian elimination with pivots on the diagonal, in the order that fills in least (Markowitz 1957). There is no pivoting for size, so
+    the values are only good where the diagonal dominates or nearly does, as in a Newton step of a short element: the caller has to check
+    the residual.
+    """
+    rows, sides = _rows(matrix), _rows(right)
+    order = _forward(rows, sides)
+    solution: list[Row] = [{} for _ in rows]
+    for p in reversed(order):
+        for j, factor in rows[p].items():
+            if j != p:
+                _subtract(sides[p], factor, solution[j])
+        inverse = 1 / rows[p][p]
+        solution[p] = {k: value * inverse for k, value in sides[p].items()}
+    result = ca.SX(*right.shape)
+    for i, row in enumerate(solution):
+        for k, value in row.items():
+            result[i, k] = value
+    return result
+
+
+def _forward(rows: list[Row], sides: list[Row]) -> list[int]:
+    """Bring the rows to triangular form; returns the order of the pivots. Row p then has itself and the columns of later pivots."""
+    left = set(range(len(rows)))
+    order = []
+    while left:
+        below = {p: [i for i in left if i != p and p in rows[i]] for p in left}
+        p = min(left, key=lambda p: ((len(rows[p]) - 1) * len(below[p]), p))
+        left.discard(p)
+        order.append(p)
+        inverse = 1 / rows[p][p]
+        pivot = {j: value for j, value in rows[p].items() if j != p}
+        for i in below[p]:
+            factor = rows[i].pop(p) * inverse
+            _subtract(rows[i], factor, pivot)
+            _subtract(sides[i], factor, sides[p])
+    return order
+
+
+def _subtract(row: Row, factor: ca.SX, other: Row) -> None:
+    for j, value in other.items():
+        row[j] = row[j] - factor * value if j in row else -factor * value
+
+
+def _rows(matrix: ca.SX) -> list[Row]:
+    rows: list[Row] = [{} for _ in range(matrix.shape[0])]
+    for i, j, value in zip(*matrix.sparsity().get_triplet(), matrix.nonzeros(), strict=True):
+        rows[i][j] = value
+    return rows
 
 
 class Propagation:
@@ -35,17 +84,17 @@ class Propagation:
         self.n, self.tables, self.phase = elements, tables, phase
         self._equations = _equations(tables, phase, ca.MX)
         self._step: ca.Function | None = None
-        if len(phase.states) * len(tables.tau) <= SMALL and expanded(phase.dynamics).is_a("SXFunction"):
+        # Only elements of few unknowns, and few instructions, have their Newton steps written out.
+        if len(phase.states) * len(tables.tau) <= MOST_UNKNOWNS and expanded(phase.dynamics).is_a("SXFunction"):
             written = _equations(tables, phase, ca.SX)
             step = _written_out(written, tables)
-            if step.n_instructions() <= SHORT:
+            if step.n_instructions() <= 30_000:
                 self._equations, self._step = written, step
         self.quick = self._step is not None
         self.inputs = sum(symbol.numel() for symbol in self._equations.symbols[1:])
 
     def elements(self, robust: bool) -> ca.Function:
-        """(initial, U, starts, h, s) -> (states at the right ends (nx, N), coefficients of the states (nx, N k), residuals (1, N)); inputs
-        of elements stand side by side."""
+        """(initial, U, starts, h, s) -> (right ends (nx, N), coefficients (nx, N k), residuals (1, N)); inputs stand side by side."""
         return self.step(robust).mapaccum("elements", self.n)
 
     def step(self, robust: bool) -> ca.Function:
@@ -55,9 +104,7 @@ class Propagation:
         return self._step
 
     def derivatives(self, interior: bool) -> ca.Function:
-        """(X, right, left, U, starts, h, s) -> the derivatives (nx, N `inputs`) of the right ends, by the left end, the controls'
-        coefficients (nu fastest), the start, the length, and s; with `interior` also, below, of the coefficients of the states (k, nx
-        fastest)."""
+        """(X, right, left, U, starts, h, s) -> derivatives (nx, N `inputs`) of the right ends [and of X] by left, U, start, h and s."""
         return _gradient(self._equations, self.tables, self.phase, interior).map(self.n)
 
 
@@ -79,9 +126,7 @@ def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
     start, h, s = symbol.sym("start"), symbol.sym("h"), symbol.sym("s", parameters)
     controls = wrapped_controls(unwrapped_law(U, phase) @ ca.DM(tables.control(tables.tau)).T, phase)
     Y, scales = ca.reshape(y, nx, nq), ca.DM([v.scale for v in phase.states])
-    rates = ca.horzcat(
-        *(phase.dynamics(Y[:, i], controls[:, i], start + 0.5 * h * (1.0 + tables.tau[i]), s) for i in range(nq)),
-    )
+    rates = ca.horzcat(*(phase.dynamics(Y[:, i], controls[:, i], start + 0.5 * h * (1.0 + tables.tau[i]), s) for i in range(nq)))
     implicit, recover = (ca.sparsify(ca.DM(matrix)) for matrix in (tables.implicit, tables.recover))
     residual = ca.vec(Y - ca.repmat(left, 1, nq) - h * (rates @ implicit)) / ca.repmat(scales, nq, 1)
     X = ca.repmat(left, 1, tables.coefficients) + h * (rates @ recover)
@@ -97,7 +142,7 @@ def _written_out(element: _Equations, tables: Tables) -> ca.Function:
     nq, h = len(tables.tau), others[2]
     Y = ca.repmat(left, nq, 1)
     Y = Y + h * ca.vec(whole(Y, left, *others)[1] @ ca.DM(tables.implicit))
-    for _ in range(WRITTEN_OUT):
+    for _ in range(5):
         Y = Y - eliminate(ca.sparsify(jacobian(Y, left, *others)), whole(Y, left, *others)[0])
     residual, _, right, X = whole(Y, left, *others)
     return ca.Function("step", [left, *others], [ca.densify(right), ca.densify(X), ca.mmax(ca.fabs(residual))], {"cse": True})
@@ -114,7 +159,7 @@ def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.F
     whole = ca.Function("whole", list(element.symbols), [element.residual, element.right, element.X])
     x = ca.MX.sym("x", nx * nq)
     equations = expanded(ca.Function("equations", [x, p], [whole(x * scales, *parts)[0]], ["x", "p"], ["g"]))
-    options = {"error_on_fail": False, "max_iter": ITERATIONS, "abstol": TOLERANCE, "abstolStep": TOLERANCE}
+    options = {"error_on_fail": False, "max_iter": 30, "abstol": 1e-14, "abstolStep": 1e-14}
     newton = ca.rootfinder("newton", "fast_newton", equations, options)
     root = newton(ca.repmat(left, nq, 1) / scales, ca.vertcat(left, ca.vec(U), *others)) * scales
     right, X = whole(root, left, U, *others)[1:]
@@ -122,8 +167,7 @@ def _iterated(element: _Equations, tables: Tables, phase: CompiledPhase) -> ca.F
 
 
 def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interior: bool) -> ca.Function:
-    """(X, right, left, U, start, h, s) -> the derivatives of (right [, X]) by (left, U, start, h, s), at states that satisfy the
-    equations."""
+    """(X, right, left, U, start, h, s) -> derivatives of (right [, X]) by (left, U, start, h, s), where the equations hold."""
     y, *inputs = element.symbols
     along = ca.veccat(*inputs)
     results = ca.vertcat(element.right, ca.vec(element.X)) if interior else element.right

@@ -5,13 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import nnls
 
-ITERATIONS = 7
-REGULAR = 1e-12
-"""Part of the diagonal entries that is added to them: rows may be linearly dependent."""
-STUCK = 1e-6
-"""A row of whose size no more than this is left, where variables are clipped, could not be moved."""
-MET, EXACT = 1e-6, 1e-10
-"""Largest miss of constraints, and that of Newton's method, in the size of the row: this one has to be exact."""
+MOST_MISSED = 1e-6
+"""Largest miss of constraints."""
 
 Box = tuple[np.ndarray, np.ndarray]
 
@@ -46,7 +41,7 @@ def least_distance(
         if nearest is not None:
             x[i], multipliers[i] = nearest
             values = A[i] @ x[i]
-            met[i] = np.maximum(lower[i] - values, values - upper[i]).max() <= MET
+            met[i] = np.maximum(lower[i] - values, values - upper[i]).max() <= MOST_MISSED
     return x, met, multipliers
 
 
@@ -56,10 +51,11 @@ def _newton(
     """Points (k, d), whether (k,) they are the nearest ones, and multipliers (k, r)."""
     (low, high), (k, r, _), transposed = box, A.shape, A.transpose(0, 2, 1)
     size = np.einsum("krd,krd->kr", A, A) + 1e-300
-    exact, floor = EXACT * np.sqrt(size), STUCK * size
+    # A row is to be met exactly, in its size. One of which no more than a millionth is left, where variables are clipped, cannot be moved.
+    exact, floor = 1e-10 * np.sqrt(size), 1e-6 * size
     equation = lower == upper
     only_equations = bool(equation.all())
-    for iteration in range(ITERATIONS + 1):
+    for iteration in range(8):
         shifted = center - (transposed @ multipliers[:, :, None])[:, :, 0]
         x = np.minimum(np.maximum(shifted, low), high)
         values = (A @ x[:, :, None])[:, :, 0]
@@ -67,12 +63,12 @@ def _newton(
         pushed = values if only_equations else values + size * multipliers
         miss = values - (lower if only_equations else np.clip(pushed, lower, upper))
         met = np.abs(miss) <= exact
-        if iteration == ITERATIONS or met.all():
+        if iteration == 7 or met.all():
             break
         gram = (A * (x == shifted)[:, None, :]) @ transposed  # over the variables that are not clipped
         diagonal = gram.reshape(k, r * r)[:, :: r + 1]
-        # A row all of whose variables are clipped is moved as if none were.
-        diagonal[...] = np.where(diagonal > floor, diagonal * (1.0 + REGULAR), size)
+        # A row all of whose variables are clipped is moved as if none were; rows may be linearly dependent.
+        diagonal[...] = np.where(diagonal > floor, diagonal * (1.0 + 1e-12), size)
         if not only_equations:
             active = equation | (pushed > upper) | (pushed < lower)
             gram, miss = np.where(active[:, :, None], gram, np.eye(r)), np.where(active, miss, -multipliers)
@@ -95,6 +91,6 @@ def _exact(center: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarr
     except RuntimeError:  # its iterations ran out
         return None
     left = 1.0 - h @ u[bounded]
-    if abs(left) < MET:
+    if abs(left) < MOST_MISSED:
         return None
     return np.clip(center + sides.T @ u / left, *box), (u[r : 2 * r] - u[:r]) / left

@@ -7,24 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base import INFEASIBLE, NLP, TIMEOUT
-from ..nlp.dense import refuse_dense
+from ..nlp.derivatives import refuse_dense
 from ..phases.reduced import Propagated, Reduced
 from ..stopping import stopping
-from .base import InnerResult, InnerSolver, scored, started
-from .effort import newton_step
+from .base import InnerResult, InnerSolver, newton_work, scored, started
 from .least_distance import least_distance
 
-NEAR = 0.1
-"""Largest scaled residual of the equations at which inequalities are considered, and steps remembered: from afar both only do
-harm."""
-CAP = 0.3
-"""Longest step, in spans."""
-STILL = 1e-6
-"""Once the next step will be no longer than this, in spans, the point is the nearest one, and only has to be feasible."""
-PATIENCE = 30
+LONGEST_STEP = 0.3
+"""Of Newton's method, in spans."""
+NEAREST_ITERATIONS = 30
 """Iterations after which a point only has to be feasible, be it the nearest one or not."""
-PLAIN, MEMORY = 2, 6
-"""Iterations before acceleration begins: near the candidate the plain ones converge as fast. Steps that it remembers."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +34,7 @@ class Newton(InnerSolver):
     exact: int = 1000
 
     def solve(self, nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None = None, *, tolerance: float = 1e-6) -> InnerResult:
-        """See `InnerSolver.solve`. If the work is to end early (`stopping`), what was not done with by then has the status "timeout"."""
+        """If the work is to end early (`stopping`), what was not done with by then has the status "timeout"."""
         start = started(nlp, candidates, warm)
         Z, best, iterations = start.copy(), np.full(len(start), np.inf), np.zeros(len(start), dtype=int)
         otherwise = np.full(len(start), INFEASIBLE)
@@ -73,41 +65,41 @@ class Newton(InnerSolver):
         feasible = best <= len(nlp.free)  # within the tolerance: what is left of it at bounds of states goes into the dynamics
         Z[feasible] = np.clip(Z[feasible], nlp.lower, nlp.upper)
         found = scored(nlp, (Z, *nlp.residuals(Z)), start, otherwise, iterations, tolerance)
-        return replace(found, work=int(iterations.sum()) * newton_step(nlp))
+        return replace(found, work=int(iterations.sum()) * newton_work(nlp))
 
     def _advance(
         self, going: _Going, iteration: int, propagated: Propagated, outside: np.ndarray, pull: np.ndarray, tolerance: float
     ) -> None:
         """One step of those that go on, from their propagated vectors."""
-        near = outside.take(going.equations, axis=1).max(axis=1, initial=0.0) <= NEAR
+        # From afar, inequalities and remembered steps only do harm.
+        near = outside.take(going.equations, axis=1).max(axis=1, initial=0.0) <= 0.1
         going.watched |= (outside > 0.1 * tolerance) & near[:, None]
         if going.settled.any():
             pull = np.where(going.settled[:, None], 0.0, pull)
         step = going.towards(propagated, pull)
         length = _norm(step)
-        if length.max() > CAP:
-            far = np.flatnonzero(length > CAP)
-            step[far] *= CAP / length[far, None]
+        if length.max() > LONGEST_STEP:
+            far = np.flatnonzero(length > LONGEST_STEP)
+            step[far] *= LONGEST_STEP / length[far, None]
             going.multipliers[far] = 0.0  # the next step is of another kind: these would lead it astray
-            length = np.minimum(length, CAP)
-        # The next step, if it shrinks as this one did.
+            length = np.minimum(length, LONGEST_STEP)
+        # The next step, if it shrinks as this one did; where it is next to none, the point is the nearest one.
         left = length * np.minimum(length / np.maximum(going.last, 1e-300), 1.0)
         going.last = length
-        settles = near & ~going.settled & ((left <= STILL) | (iteration >= PATIENCE))
+        settles = near & ~going.settled & ((left <= 1e-6) | (iteration >= NEAREST_ITERATIONS))
         if settles.any():
             going.settled |= settles
             going.multipliers[settles] = 0.0
         accelerated = near & ~going.settled
-        if iteration >= PLAIN and accelerated.any():
+        if iteration >= 2 and accelerated.any():
             improved = going.memory.improve(going.x, step, accelerated)
-            improved *= np.minimum(1.0, CAP / np.maximum(_norm(improved), 1e-300))[:, None]
+            improved *= np.minimum(1.0, LONGEST_STEP / np.maximum(_norm(improved), 1e-300))[:, None]
             step = np.where(accelerated[:, None], improved, step)
         going.x = np.minimum(np.maximum(going.x + step, -going.walls), 1.0 + going.walls)
 
 
 class _Going:
-    """The candidates of a batch that are not done, in the unit cube. index (k,), x, center (k, d), watched (k, rows), multipliers (k,
-    rows), settled (k,), last (k,), exact (k,)."""
+    """The candidates of a batch that are not done, in the unit cube: x, center (k, d), watched, multipliers (k, rows), others (k,)."""
 
     def __init__(self, nlp: NLP, start: np.ndarray, exact: int) -> None:
         refuse_dense(nlp)
@@ -121,7 +113,7 @@ class _Going:
         self.x = self.center = (start[:, free] - self.origin) / self.span
         self.watched, self.multipliers = np.tile(self.reduced.equation, (k, 1)), np.zeros((k, len(self.reduced.equation)))
         self.settled, self.last = np.zeros(k, dtype=bool), np.zeros(k)
-        self.memory = Anderson(k, len(free), MEMORY)
+        self.memory = Anderson(k, len(free), memory=6)
 
     def keep(self, on: np.ndarray) -> None:
         """Go on with some of them only."""
@@ -182,9 +174,6 @@ def _outside(reduced: Reduced, propagated: Propagated) -> np.ndarray:
     return np.maximum(reduced.lower - propagated.values, propagated.values - reduced.upper) / reduced.scale
 
 
-REGULAR = 1e-10
-
-
 class Anderson:
     """Remembers the last steps of k iterations x -> x + s(x) and combines them so that the linear part of s vanishes soonest.
 
@@ -212,6 +201,6 @@ class Anderson:
         self._known[good] = True
         gram = ds @ ds.transpose(0, 2, 1)
         diagonal = np.einsum("kii->ki", gram)
-        diagonal += REGULAR * diagonal.max(axis=1, keepdims=True) + 1e-300
+        diagonal += 1e-10 * diagonal.max(axis=1, keepdims=True) + 1e-300
         share = np.linalg.solve(gram, ds @ s[:, :, None])
         return s - ((dx + ds).transpose(0, 2, 1) @ share)[:, :, 0]

@@ -1,7 +1,12 @@
-"""Errors of a trajectory element by element, independent of the transcription, in units of what states and controls do on it."""
+"""Errors of a trajectory element by element, independent of the transcription, in units of what states and controls do on it.
+
+The bounds of a variable may be any number of times as wide as what it does between them. An error that is small against the bounds may be
+all of the solution.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,18 +14,60 @@ import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
+from ..base import NLP
 from ..numerics.polynomials import gauss_legendre, legendre_coefficients
 from ..trajectories.limits import DENSE, excess_by_element, paths_and_peaks
 from ..trajectories.simulate import Simulation
-from ..trajectories.trajectory import PhaseTrajectory, Trajectory
-from .scales import control_scales, state_scales
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
-STEEP = 3.0
-"""A control is steep where it changes so many times faster than on average over its element."""
-ON_BOUND = 1e-3
-"""A control is on a bound if it is nearer than this, in spans."""
-FLAT = 1e-4
+FLAT_ON_ELEMENT = 1e-4
 """A quantity that varies by less than this on an element, in scales, counts as constant: its rate of decay means nothing."""
+
+
+def own_scales(low: np.ndarray, high: np.ndarray, span: np.ndarray) -> np.ndarray:
+    """What counts as one in quantities (k,) between the values `low` and `high` of a trajectory, with bounds of these spans: their ranges
+    there, at least a thousandth of their size and a millionth of the span for those that are constant, and never more than the span."""
+    size = np.maximum(np.abs(low), np.abs(high))
+    return np.minimum(span, np.max([high - low, 1e-3 * size, 1e-6 * span], axis=0))
+
+
+def _of(piece: PiecewisePolynomial, variables: Sequence[Variable]) -> np.ndarray:
+    values = piece.on_elements(DENSE)
+    return own_scales(values.min(axis=(0, 1)), values.max(axis=(0, 1)), np.array([v.span for v in variables]))
+
+
+def state_scales(trajectory: PhaseTrajectory) -> np.ndarray:
+    """What counts as one in each state (nx,) of a phase."""
+    return _of(trajectory.state, trajectory.state_variables)
+
+
+def control_scales(trajectory: PhaseTrajectory) -> np.ndarray:
+    """What counts as one in each control (nu,) of a phase."""
+    return _of(trajectory.control, trajectory.control_variables)
+
+
+def objective_variations(nlp: NLP, z: np.ndarray) -> np.ndarray:
+    """How much the objectives (m,) change if the entries of a vector (n,) are changed by random parts of what they do: the median of 31.
+
+    It is a size of objectives that does not vanish where they do, and does not depend on the width of bounds.
+    """
+    ranges = np.minimum(nlp.span, _ranges(nlp, z))
+    rng = np.random.default_rng(0)
+    changed = np.clip(z + ranges * rng.standard_normal((31, len(z))), nlp.lower, nlp.upper)
+    F, _ = nlp.evaluate(np.vstack([z, changed]))
+    change = np.abs(F[1:] - F[0])
+    return np.median(np.where(np.isfinite(change), change, 0.0), axis=0)
+
+
+def _ranges(nlp: NLP, z: np.ndarray) -> np.ndarray:
+    """The ranges (n,) of what the entries of a vector belong to: all with the same name but for what stands in brackets."""
+    names = np.array([re.split(r"[\[(]", v.name)[0] for v in nlp.variables])
+    _, member = np.unique(names, return_inverse=True)
+    low, high = np.full(member.max() + 1, np.inf), np.full(member.max() + 1, -np.inf)
+    np.minimum.at(low, member, z)
+    np.maximum.at(high, member, z)
+    finite = np.where(np.isfinite(nlp.span), nlp.span, 1.0)
+    return own_scales(low[member], high[member], finite)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +110,9 @@ def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, simulated: PhaseT
     controls, states = _coefficients(trajectory)
     share, integrand_rate = _quadrature(phase, trajectory, parameters)
     peaks = _peak_shares(phase, trajectory, parameters)
+    defect = (np.abs(simulated.state.ends()[1] - trajectory.edge_states[1:]) / state_scales(trajectory)).max(axis=1)
     return PhaseErrors(
-        defect=_local_defects(trajectory, simulated),
+        defect=np.where(np.isfinite(defect), defect, np.inf),
         sums=np.maximum(share, peaks),
         excess=np.max([nothing, *(amount for name, amount in excess.items() if name not in names)], axis=0),
         leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
@@ -75,13 +123,6 @@ def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, simulated: PhaseT
         integrand_rate=np.where(peaks > 0.0, 0.0, integrand_rate),
         steep=np.array([_steepest(one, phase.controls, scales) for one in values]),
     )
-
-
-def _local_defects(trajectory: PhaseTrajectory, simulated: PhaseTrajectory) -> np.ndarray:
-    """See `PhaseErrors.defect`."""
-    difference = np.abs(simulated.state.ends()[1] - trajectory.edge_states[1:]) / state_scales(trajectory)
-    worst = difference.max(axis=1)
-    return np.where(np.isfinite(worst), worst, np.inf)
 
 
 def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,7 +175,6 @@ def _tails(controls: np.ndarray) -> np.ndarray:
 
 
 def _weights(trajectory: PhaseTrajectory) -> np.ndarray:
-    """See `PhaseErrors.weight`."""
     lengths = np.diff(trajectory.state.edges)
     ways = np.abs(np.diff(trajectory.state.on_elements(DENSE), axis=1)).sum(axis=1)
     # The way of a state that hardly moves is noise.
@@ -146,7 +186,7 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
     """Exponential rates (N,) at which Legendre coefficients (N, k, columns) decay, from the largest of the first to that of the last ones.
 
     The slope of a line through the logarithms of the coefficients from the second on, each taken as large as the largest one after it. The
-    slowest column counts, of those that are not `FLAT`. Infinite where all of them are, or where there are too few to tell.
+    slowest column counts, of those that are not `FLAT_ON_ELEMENT`. Infinite where all of them are, or where there are too few to tell.
     """
     count, k, _ = coefficients.shape
     if k < 3:
@@ -160,7 +200,7 @@ def decay_rates(coefficients: np.ndarray) -> np.ndarray:
     slope = degree - degree.mean()
     logarithms = np.log(np.maximum(size, 1e-14))
     found = -np.einsum("k,nkc->nc", slope, logarithms) / (slope**2).sum()
-    return np.where(size[:, 0] > FLAT, found, np.inf).min(axis=1, initial=np.inf)
+    return np.where(size[:, 0] > FLAT_ON_ELEMENT, found, np.inf).min(axis=1, initial=np.inf)
 
 
 def _coefficients(trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
@@ -174,7 +214,7 @@ def _coefficients(trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _steepest(values: np.ndarray, variables: Sequence[Variable], scales: np.ndarray) -> float:
-    """See `PhaseErrors.steep`, on one element, from its controls (len(DENSE), nu)."""
+    """Where, on one element, a control leaves a bound or changes three times faster than on average; else NaN. values (len(DENSE), nu)."""
     for i, v in enumerate(variables):
         if v.period is None and not np.isnan(place := _switch(values[:, i], v, scales[i])):
             return place
@@ -185,16 +225,19 @@ def _steepest(values: np.ndarray, variables: Sequence[Variable], scales: np.ndar
     # Polynomials are steeper towards the ends, by this much (Bernstein's inequality), in any case.
     slopes = change / np.diff(DENSE)[:, None] * np.sqrt(1.0 - middle[:, None] ** 2)
     mean = change.sum(axis=0) / 2.0
-    ratio = np.where(mean > FLAT, slopes.max(axis=0) / np.where(mean > 0, mean, 1.0), 0.0)
+    ratio = np.where(mean > FLAT_ON_ELEMENT, slopes.max(axis=0) / np.where(mean > 0, mean, 1.0), 0.0)
     column = int(np.argmax(ratio))
-    return float(middle[np.argmax(slopes[:, column])]) if ratio[column] >= STEEP else np.nan
+    return float(middle[np.argmax(slopes[:, column])]) if ratio[column] >= 3.0 else np.nan
 
 
 def _switch(values: np.ndarray, bounds: Variable, scale: float) -> float:
-    """The place where a control, given at `DENSE`, leaves or reaches a bound; between two bounds, half way; NaN if it does not."""
-    on = np.minimum(np.abs(values - bounds.lower), np.abs(values - bounds.upper)) < ON_BOUND * bounds.span
+    """The place where a control, given at `DENSE`, leaves or reaches a bound; between two bounds, half way; NaN if it does not.
+
+    It is on a bound where it is nearer than a thousandth of the span, and only counts if it does ten times as much.
+    """
+    on = np.minimum(np.abs(values - bounds.lower), np.abs(values - bounds.upper)) < 1e-3 * bounds.span
     changes = 0.5 * (DENSE[1:] + DENSE[:-1])[on[1:] != on[:-1]]
-    if not len(changes) or np.ptp(values) < 10.0 * ON_BOUND * scale:
+    if not len(changes) or np.ptp(values) < 1e-2 * scale:
         return np.nan
     if on[0] and on[-1]:
         return float(0.5 * (changes[0] + changes[-1]))

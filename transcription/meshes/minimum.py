@@ -17,28 +17,20 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
 
 from ..base import NLP
-from ..nlp.hamiltonian import hamiltonian, integral_weights
+from ..nlp.costates import hamiltonian, integral_weights
 from ..numerics.polynomials import gauss_legendre
 from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 TAU, WEIGHTS = gauss_legendre(24)
 """Where the Hamiltonian is looked at on each element."""
-GRID = 11
-"""Number of values of each control, from bound to bound, that are compared with its own."""
-STEPS = (-0.05, -0.01, 0.01, 0.05)
-"""Further ones beside its own, in spans."""
-JUMP = 0.5
-"""A control jumps where it changes by more than this from one place to the next, in spans."""
-CORNERS = 4
-"""Most controls of which all combinations of bounds are tried, too."""
-NEAR = 1e-3
+NEAR_LIMIT = 1e-3
 """Where a state, a path constraint or a peak is this near to its limit, in scales, multipliers of that are part of the principle, and
 nothing is said."""
 
 
 @dataclass(frozen=True, eq=False)
-class Optimum:
+class OptimumMultipliers:
     """Costates of an optimum on its mesh by phase, and the multipliers of objectives (m,) and of the problem's constraints."""
 
     costates: Mapping[str, PiecewisePolynomial]
@@ -46,7 +38,7 @@ class Optimum:
     of_constraints: np.ndarray
 
     @classmethod
-    def of(cls, nlp: NLP, z: np.ndarray, multipliers: np.ndarray) -> Optimum:
+    def of(cls, nlp: NLP, z: np.ndarray, multipliers: np.ndarray) -> OptimumMultipliers:
         """From the multipliers (m + r,) of the objectives and rows of an NLP at its optimum z (n,)."""
         m, constraints = len(nlp.problem.goals), len(nlp.problem.limits)
         return cls(nlp.costates(z, multipliers[m:]), multipliers[:m], multipliers[len(multipliers) - constraints :])
@@ -63,7 +55,7 @@ class Gain:
 
 
 def gains(
-    problem: CompiledProblem, trajectory: Trajectory, optimum: Optimum, quantities: Sequence[np.ndarray], units: np.ndarray
+    problem: CompiledProblem, trajectory: Trajectory, optimum: OptimumMultipliers, quantities: Sequence[np.ndarray], units: np.ndarray
 ) -> dict[str, Gain]:
     """What the controls of each phase with costates could gain. units (m,)."""
     # The sum of the objectives in which a gain is one unit of each.
@@ -107,24 +99,24 @@ def _gain(
         best[better], least[better] = (own - values)[better], controls[better]
     rates = np.where(clear & np.isfinite(own), best, 0.0).reshape(shape)
     amounts = 0.5 * np.diff(trajectory.state.edges) * (rates @ WEIGHTS)
-    jumps = np.abs(np.diff(least.reshape(*shape, -1), axis=1)) > JUMP * np.array([v.span for v in phase.controls])
+    jumps = np.abs(np.diff(least.reshape(*shape, -1), axis=1)) > 0.5 * np.array([v.span for v in phase.controls])
     middles = 0.5 * (TAU[1:] + TAU[:-1])
     return Gain(amounts, [middles[one] for one in np.any(jumps, axis=2)])
 
 
 def _others(phase: CompiledPhase, u: np.ndarray) -> list[np.ndarray]:
-    """Other controls (k, nu) to be compared with those of the trajectory: one changed at a time, and all of them on bounds."""
+    """Other controls (k, nu) to compare: one changed at a time, on a grid and near its own value; and all of a few on their bounds."""
     lower, upper = (np.array([getattr(v, side) for v in phase.controls]) for side in ("lower", "upper"))
     found = []
     for i in range(len(lower)):
         span = upper[i] - lower[i]
-        values = [np.full(len(u), value) for value in np.linspace(lower[i], upper[i], GRID)]
-        values += [np.clip(u[:, i] + step * span, lower[i], upper[i]) for step in STEPS]
+        values = [np.full(len(u), value) for value in np.linspace(lower[i], upper[i], 11)]
+        values += [np.clip(u[:, i] + step * span, lower[i], upper[i]) for step in (-0.05, -0.01, 0.01, 0.05)]
         for one in values:
             other = u.copy()
             other[:, i] = one
             found.append(other)
-    if 1 < len(lower) <= CORNERS:
+    if 1 < len(lower) <= 4:
         found += [np.tile(corner, (len(u), 1)) for corner in product(*zip(lower, upper, strict=True))]
     return found
 
@@ -140,7 +132,7 @@ def _clear(phase: CompiledPhase, x: np.ndarray, paths: np.ndarray, peaks: np.nda
     clear = np.ones(len(x), dtype=bool)
     limits: tuple[Variable | Limit, ...] = (*phase.states, *phase.paths)
     for limit, column in zip(limits, np.hstack([x, paths]).T, strict=True):
-        near = NEAR * limit.scale
+        near = NEAR_LIMIT * limit.scale
         clear &= (column - limit.lower > near) & (limit.upper - column > near)
     sizes = np.where(highest != 0, np.abs(highest), 1.0)
-    return clear & (highest - peaks > NEAR * sizes).all(axis=1)
+    return clear & (highest - peaks > NEAR_LIMIT * sizes).all(axis=1)

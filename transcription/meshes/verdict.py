@@ -7,28 +7,48 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledPhase, CompiledProblem
 
 from ..meshed import Meshed
+from ..trajectories.arcs import Arcs
 from ..trajectories.simulate import Simulation, simulate, simulate_elements
-from ..trajectories.trajectory import Trajectory
-from .errors import PhaseErrors, phase_errors
-from .growth import growth
-from .minimum import Gain, Optimum, gains
-from .scales import state_scales
+from ..trajectories.trajectory import PhaseTrajectory, Trajectory
+from .errors import PhaseErrors, phase_errors, state_scales
+from .minimum import Gain, OptimumMultipliers, gains
 
-SAFETY = 0.5
-"""Share of the tolerance that the elements of a phase are to have together, were their errors equal."""
-COST = 10.0
-"""Multiple of the tolerance by which objectives may be off, unless that is stated: their loss by poorly described controls is of second
-order."""
-ATTAINABLE = 1e-11
-"""Error of an element, in scales, that cannot be undercut: where that, grown along the trajectory, is more than the tolerance, no mesh
-helps."""
-OPTIMISM = 3.0
-"""A trajectory that is feasible only within the tolerance may have objectives that are too low by so many times its violation."""
-HARDLY = 1e-2
-"""An element's share of the defect of the whole below which it is worth finding out whether errors grow."""
+
+def growth(problem: CompiledProblem, trajectory: Trajectory) -> float:
+    """The largest factor by which an error of a state, in scales, grows on its way through a phase, to first order; at least 1."""
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    return max(_phase_growth(phase, trajectory[phase.name], parameters) for phase in problem.phases)
+
+
+def _phase_growth(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> float:
+    transitions = _transitions(phase, trajectory, parameters)
+    if not np.isfinite(transitions).all():
+        return np.inf
+    largest, reached = 1.0, np.eye(transitions.shape[1])[None]
+    for one in transitions:
+        # From the beginnings of all elements so far to the end of this one.
+        reached = one @ reached
+        largest = max(largest, float(np.abs(reached).sum(axis=2).max()))
+        if largest > 1e100:
+            return np.inf
+        reached = np.concatenate([reached, np.eye(transitions.shape[1])[None]])
+    return largest
+
+
+def _transitions(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> np.ndarray:
+    """Derivatives (N, nx, nx) of the states at the ends of the elements by those at their beginnings, in scales."""
+    elements, nx = len(trajectory.state.coefficients), len(phase.states)
+    scales, nothing = state_scales(trajectory), np.zeros((elements * (nx + 1), phase.integrands.size1_out(0)))
+    rtol, step = 1e-11, 1e-6  # a state is changed, in scales, by about the root of what the integrator resolves
+    changed = np.vstack([np.zeros(nx), step * np.diag(scales)])
+    starts = (trajectory.edge_states[:-1, None] + changed).reshape(-1, nx)
+    arcs = Arcs.of(phase, [(trajectory, j, parameters) for j in range(elements) for _ in range(nx + 1)])
+    tolerances = 0.1 * rtol * np.concatenate([scales, np.ones(nothing.shape[1])])
+    ends = arcs.integrate(np.hstack([starts, nothing]), rtol, tolerances, "DOP853")[:, -1, :nx].reshape(elements, nx + 1, nx)
+    return ((ends[:, 1:] - ends[:, :1]) / (step * scales)).swapaxes(1, 2)
 
 
 @dataclass(frozen=True)
@@ -38,7 +58,8 @@ class Wanted:
     tolerance: float  # largest defect: of the simulated states from those of the mesh, in units of what the states do
     feasible: float  # largest excess of constraints, simulated and between nodes, in their scales
     leaving: float = 0.0  # the same for controls between nodes
-    objectives: float | None = None  # largest error of an objective, in its unit; by default `COST` tolerances
+    # Largest error of an objective, in its unit; by default ten tolerances: the loss by poorly described controls is of second order.
+    objectives: float | None = None
     # Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does, and meshes are not refined
     # for controls that polynomials of their degree describe poorly.
     confirmed: bool = True
@@ -46,7 +67,7 @@ class Wanted:
     @property
     def settled(self) -> float:
         """Largest error of an objective."""
-        return COST * self.tolerance if self.objectives is None else self.objectives
+        return 10.0 * self.tolerance if self.objectives is None else self.objectives
 
     @property
     def accuracy(self) -> float:
@@ -79,8 +100,8 @@ class Verdict:
 
     @property
     def doubt(self) -> float:
-        """By how much, in their units, objectives of the simulation may be too low since constraints are not satisfied exactly."""
-        return OPTIMISM * self.simulation.violation / self.narrow
+        """How much too low, in their units, objectives may be since constraints are not satisfied exactly: three times the violation."""
+        return 3.0 * self.simulation.violation / self.narrow
 
     @property
     def local(self) -> float:
@@ -99,8 +120,8 @@ class Verdict:
 
     @property
     def unstable(self) -> bool:
-        """Whether no simulation of the whole can follow the trajectory, so that each element is assessed by itself."""
-        return self.growth * ATTAINABLE > self.wanted.tolerance
+        """Whether no simulation of the whole can follow: the least error of an integrator, 1e-11, grown along it, is not tolerable."""
+        return self.growth * 1e-11 > self.wanted.tolerance
 
     @property
     def off(self) -> float:
@@ -144,7 +165,7 @@ class Verdict:
 
     def scores(self) -> list[ElementScores]:
         """For each phase the errors of its elements, in units of what they may be."""
-        wanted = self.wanted
+        wanted, safety = self.wanted, 0.5  # the share of the tolerance that elements have together, were their errors equal
         total = sum(float(phase.defect.sum()) for phase in self.errors)
         # What an error at one element becomes at the end of the trajectory, at least.
         finite = 0.0 < total < np.inf and np.isfinite(self.defect) and not self.unstable
@@ -152,13 +173,13 @@ class Verdict:
         count = sum(len(phase.defect) for phase in self.errors)
         found = []
         for phase in self.errors:
-            states = np.maximum(grown * phase.defect * count / (SAFETY * wanted.tolerance), phase.excess / wanted.feasible)
+            states = np.maximum(grown * phase.defect * count / (safety * wanted.tolerance), phase.excess / wanted.feasible)
             controls, sums = np.zeros((2, len(states)))
             # That controls are not optimal, no simulation sees.
             if wanted.confirmed:
                 controls = phase.weight * phase.tail**2 * count / wanted.settled
-            if not self.missed_by_elements <= SAFETY * wanted.settled:
-                sums = phase.sums * count * self.missed_by_elements / (SAFETY * wanted.settled)
+            if not self.missed_by_elements <= safety * wanted.settled:
+                sums = phase.sums * count * self.missed_by_elements / (safety * wanted.settled)
             found.append(ElementScores(*(np.nan_to_num(part, nan=np.inf, posinf=np.inf) for part in (states, controls, sums))))
         return found
 
@@ -176,8 +197,7 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class ElementScores:
-    """Errors (N,) of the elements of a phase in units of what they may be: of states and limits; of controls that polynomials of their
-    degree describe poorly; of integrals and peaks."""
+    """Errors (N,) of a phase's elements in units of what they may be: states and limits; controls; integrals and peaks."""
 
     states: np.ndarray
     controls: np.ndarray
@@ -195,7 +215,12 @@ class ElementScores:
 
 
 def judge(
-    problem: CompiledProblem, trajectory: Trajectory, wanted: Wanted, F: np.ndarray, units: np.ndarray, optimum: Optimum | None = None
+    problem: CompiledProblem,
+    trajectory: Trajectory,
+    wanted: Wanted,
+    F: np.ndarray,
+    units: np.ndarray,
+    optimum: OptimumMultipliers | None = None,
 ) -> Verdict:
     """The assessment of a trajectory by an integrator that is far more exact than the tolerance; see `Verdict`. F, units (m,)."""
     rtol = wanted.accuracy
@@ -212,7 +237,8 @@ def judge(
     ]
     defect = float(np.max(away)) if np.isfinite(away).all() else np.inf
     total = sum(float(phase.defect.sum()) for phase in errors)
-    grows = defect > wanted.tolerance and total < HARDLY * defect
+    # Where elements hardly have a share in the defect of the whole, errors grow.
+    grows = defect > wanted.tolerance and total < 0.01 * defect
     return Verdict(
         problem=problem,
         simulation=whole,

@@ -1,7 +1,11 @@
-"""Sparse derivatives of NLPs: put together from those at points where an NLP has such parts, else of one long list of operations."""
+"""Sparse derivatives of NLPs: put together from those at points where an NLP has such parts, else of one long list of operations.
+
+Those of many rows are built some hundreds of rows at a time: between the pieces it is asked whether the work is to end early.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import casadi as ca
@@ -10,12 +14,13 @@ import numpy as np
 from problems.compiled import remembered
 
 from ..base import NLP
-from .dense import refuse_dense
+from ..stopping import check_stopping
 from .from_points import FromPoints, kind_of
-from .pieces import jacobian, weighted_hessian
 
-DENSE = 0.25
-"""Share of the variables that a row is dense with."""
+MOST_GIGABYTES = 2.0
+"""Most memory that the derivatives of one NLP may take."""
+PIECE = 500
+"""Rows of one piece. Their derivatives take less than a second, whereas those of all rows of a fine mesh take many."""
 
 
 @remembered
@@ -78,9 +83,73 @@ def _symbol(nlp: NLP, name: str, size: int) -> Any:
 def _jacobian(rows: Any, z: Any) -> Any:
     """Derivatives of the rows; dense ones, those of integrals, apart: one sweep for many columns is lost where there is one such row."""
     counts = np.diff(ca.jacobian_sparsity(rows, z).T.colind())
-    dense = np.flatnonzero(counts > DENSE * max(z.numel(), 1))
+    dense = np.flatnonzero(counts > 0.25 * max(z.numel(), 1))
     if not len(dense) or len(dense) == len(counts):
         return jacobian(rows, z)
     sparse = np.setdiff1d(np.arange(len(counts)), dense)
     blocks = ca.vertcat(*(jacobian(rows[which.tolist()], z) for which in (sparse, dense)))
     return blocks[np.argsort(np.concatenate([sparse, dense])).tolist(), :]
+
+
+def jacobian(rows: Any, z: Any) -> Any:
+    """The Jacobian of rows (r,) with respect to z, sparse. Raises `Stopped` if the work is to end early."""
+    if not _several(rows):
+        return ca.jacobian(rows, z)
+    found = []
+    for first, last, used in _pieces(rows, z):
+        part = ca.jacobian(rows[first:last], z[used])
+        part.enlarge(last - first, z.numel(), list(range(last - first)), used)
+        found.append(part)
+    return ca.vertcat(*found)
+
+
+def weighted_hessian(rows: Any, weights: Any, z: Any, more: Any) -> Any:
+    """The upper triangle of the Hessian of `more` + weights'rows with respect to z, sparse. Raises `Stopped` as `jacobian` does."""
+    if not _several(rows):
+        return ca.triu(ca.hessian(more + ca.dot(weights, rows), z)[0])
+    total = ca.SX(z.numel(), z.numel())
+    for first, last, used in _pieces(rows, z):
+        lagrangian = ca.dot(weights[first:last], rows[first:last])
+        if not first:
+            lagrangian, used = more + lagrangian, sorted({*used, *ca.jacobian_sparsity(more, z).get_triplet()[1]})
+        part = ca.triu(ca.hessian(lagrangian, z[used])[0])
+        part.enlarge(z.numel(), z.numel(), used, used)
+        total += part
+    return total
+
+
+def _several(rows: Any) -> bool:
+    """Whether rows are derived in pieces. Those that are not made of scalar operations are one piece, since each piece of them would have
+    all operations."""
+    return rows.numel() > PIECE and isinstance(rows, ca.SX)
+
+
+def _pieces(rows: Any, z: Any) -> Iterator[tuple[int, int, list[int]]]:
+    """The first row of each piece, that after its last, and the entries of z on which it depends: derivatives by all of z would take time
+    in proportion to z for each piece."""
+    by_row, count = ca.jacobian_sparsity(rows, z).T, rows.numel()
+    starts, columns = np.array(by_row.colind()), np.array(by_row.row(), dtype=int)
+    for first in range(0, count, PIECE):
+        check_stopping()
+        last = min(first + PIECE, count)
+        yield first, last, np.unique(columns[starts[first] : starts[last]]).tolist()
+
+
+def too_dense(nlp: NLP) -> bool:
+    """Whether the derivatives of an NLP would take more memory than `MOST_GIGABYTES`."""
+    return _gigabytes(nlp) > MOST_GIGABYTES
+
+
+def refuse_dense(nlp: NLP) -> None:
+    """Raise ValueError if the derivatives of an NLP would take too much memory: how much, and what to use instead."""
+    if too_dense(nlp):
+        raise ValueError(
+            f"problem '{nlp.problem.name}', {nlp.transcription!r}: derivatives would take about {_gigabytes(nlp):.3g} GB, more than "
+            f"{MOST_GIGABYTES:g} GB, since the states depend on all controls before them: use MultipleShooting with as many intervals, "
+            "whose derivatives are sparse, or fewer nodes, or a search without derivatives, inner='propagate'"
+        )
+
+
+def _gigabytes(nlp: NLP) -> float:
+    """Memory until a program is ready: 120 bytes a derivative, measured on ascents with 800 and 1600 nodes."""
+    return 120 * nlp.dense / 1e9

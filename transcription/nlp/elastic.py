@@ -21,21 +21,8 @@ from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..phases.writer import DYNAMICS
 from ..stopping import Stopped, check_stopping, stopping
 from .derivatives import gradients, hessian
-from .program import multiplied
-from .scalarized import SOLVED, Solved, not_begun
-from .scaling import STATUS_OF_IPOPT, back_in_bounds, ipopt_options, origin, scaled_bounds
-from .watched import Watched
-
-HEAVY = 100.0
-"""How much more the equations of the dynamics weigh than other rows."""
-ACCURACY = 1e-9
-"""IPOPT's tolerance: of the sum, over thousands of rows."""
-INSIDE = 1e-2
-"""By how much more than they miss rows may give way at the start, in their scales."""
-MET = 1e-6
-"""Violation, in scales, up to which a constraint is met."""
-OPPOSING = 1e-2
-"""Least multiplier of a constraint that opposes others: how much less these would miss in sum, were its limit moved by a scale."""
+from .program import STATUS_OF_IPOPT, Watched, back_in_bounds, ipopt_options, multiplied, origin, scaled_bounds
+from .scalarized import SOLVE, SOLVED, Solved, not_begun
 
 
 def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max_iterations: int = 300, seconds: float = 600.0) -> Solved:
@@ -55,7 +42,8 @@ def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max
     limits = nlp.g_lower * weights / nlp.g_scale, nlp.g_upper * weights / nlp.g_scale
     (lower, upper), none = scaled_bounds(nlp), np.zeros(2 * len(weights))
     answer = run(
-        x0=np.concatenate([(start - origin(nlp)) / nlp.scale, gaps + INSIDE, gaps + INSIDE]),
+        # Rows may give way by a hundredth of their scales more than they miss: that is inside.
+        x0=np.concatenate([(start - origin(nlp)) / nlp.scale, gaps + 0.01, gaps + 0.01]),
         lbx=np.append(lower, none),
         ubx=np.append(upper, none + np.inf),
         lbg=limits[0],
@@ -91,14 +79,15 @@ def opposing(nlp: NLP, z: np.ndarray) -> tuple[str, ...]:
         return ()
     missed, strengths = nlp.violations(solved.z), np.abs(solved.multipliers[len(solved.F) :]) * nlp.g_scale
     for label, strength in zip(nlp.g_labels, strengths.tolist(), strict=True):
-        if not label.startswith(DYNAMICS) and missed[label] <= MET:
+        if not label.startswith(DYNAMICS) and missed[label] <= 1e-6:
             found[label] = found.get(label, 0.0) + strength
-    return tuple(sorted((label for label in found if found[label] > OPPOSING), key=lambda label: -found[label]))
+    # The multiplier of a constraint is how much less the others would miss in sum, were its limit moved by a scale.
+    return tuple(sorted((label for label in found if found[label] > 0.01), key=lambda label: -found[label]))
 
 
 def _weights(nlp: NLP) -> np.ndarray:
-    """What a scale of each row (r,) counts."""
-    return np.array([HEAVY if label.startswith(DYNAMICS) else 1.0 for label in nlp.g_labels])
+    """What a scale of each row (r,) counts; equations of the dynamics a hundred times as much as others."""
+    return np.array([100.0 if label.startswith(DYNAMICS) else 1.0 for label in nlp.g_labels])
 
 
 @remembered
@@ -123,5 +112,5 @@ def _program(nlp: NLP, seconds: float, max_iterations: int) -> Watched:
         ),
     }
     options = ipopt_options(seconds, max_iterations)
-    options |= {"ipopt.tol": ACCURACY, "ipopt.nlp_scaling_method": "none", "ipopt.bound_relax_factor": 0.0, "ipopt.mu_init": 0.1}
+    options |= {"ipopt.tol": SOLVE.accuracy, "ipopt.nlp_scaling_method": "none", "ipopt.bound_relax_factor": 0.0, "ipopt.mu_init": 0.1}
     return Watched("elastic", {"x": x, "f": ca.sum1(up) + ca.sum1(down), "g": values}, options | derivatives)

@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 
 from ..base import NLP
-from ..phases.pointwise import Parts
+from ..phases.rows import Parts
 
-SHARED = 0.25
+SHARED_PART = 0.25
 """What points have in common is evaluated once for all where it is at least this part of the instructions of one point."""
 
 
@@ -105,7 +105,7 @@ class _Point:
         p, self.u = v[np.flatnonzero(np.isin(vary, alike)).tolist()], list[Any]()
         if kind is ca.SX and p.numel():
             kept, symbols, u = ca.extract_parametric(values, p)
-            if u and ca.Function("u", [p], u).n_instructions() >= SHARED * function.n_instructions():
+            if u and ca.Function("u", [p], u).n_instructions() >= SHARED_PART * function.n_instructions():
                 v, values, self.u = ca.vertcat(v, *symbols), kept, [p, ca.vertcat(*u)]
         self._symbols, self._values = (v, rest, of_w), values
         self.count, J = v.numel(), ca.jacobian(self._values, v)

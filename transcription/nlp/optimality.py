@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,25 +15,15 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from ..base import NLP
 from .derivatives import gradients
-from .scaling import nlp_scales
+from .program import nlp_scales
 
-NEAR = 1e-2
-"""Inequalities and bounds with more slack than this, in scales, are taken to have no multiplier."""
 DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
-REGULAR = 1e-12
-"""Regularisation of equality rows that are linearly dependent; refinement removes its effect."""
-BEYOND, DETERMINED, ADJOINT = 50, 1e-9, 1e-6
-"""Most equations beyond those of the states for which these are eliminated; what may be left of their derivatives then, as a part; and
-what may be left where they are not: by the weight of states, what a unit of the free variables does to them times `DEPENDENT`."""
-SMALL = 1e-6
+MOST_BEYOND = 50
+"""Equations beyond those of the states for which these are eliminated: each takes a solve, and a column of a dense system."""
+SMALL_MULTIPLIERS = 1e-6
 """What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
 that the residual asks for, far more than round-off."""
-FINE = 0.1
-"""Part of it with which the weights of several objectives are found. Where a front bends sharply, as that of a flight with hundreds of
-active limits does, they are off by a hundredth with all of it, and by the square of this less."""
-REFINEMENTS, EXACT = 3, 1e-12
-"""As many at most, until what is left of the right-hand sides is this part of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +118,6 @@ class Conditions:
 
     @cached_property
     def residual(self) -> float:
-        """See `optimality`."""
         try:
             return _least(self.reduced, self.linear.slack)[0]
         except (RuntimeError, np.linalg.LinAlgError):
@@ -150,9 +140,11 @@ class Conditions:
         are not unique, and round-off would choose among them. The smallest are taken, and of limits of free variables rather than others:
         first the weights of the objectives, and then the multipliers that belong to them.
         """
-        m, slack, small = len(self.linear.of_objectives), self.linear.slack, SMALL * np.concatenate(self._others())
+        m, slack, small = len(self.linear.of_objectives), self.linear.slack, SMALL_MULTIPLIERS * np.concatenate(self._others())
         try:
-            weights = _least(self.reduced, slack, FINE * small)[1][:m] if m > 1 else np.ones(m)
+            # Where a front bends sharply, as that of a flight with hundreds of active limits does, weights would be off by a hundredth with
+            # all of `small`; they are by the square of this part less.
+            weights = _least(self.reduced, slack, 0.1 * small)[1][:m] if m > 1 else np.ones(m)
             weighted = np.column_stack([self.reduced[:, :m] @ weights, self.reduced[:, m:]])
             return weights, _least(weighted, slack, small)[1][1:]
         except (RuntimeError, np.linalg.LinAlgError):
@@ -187,13 +179,9 @@ def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tup
     """Masks of the lower and upper bounds (n,) and of the lower and upper limits of rows (r,) that may have a multiplier; scaled gradients
     (k, n) and slacks (k,) of these inequalities c >= 0, in that order."""
     bounded, one_way = (nlp.period == 0) & np.isfinite(nlp.span), nlp.g_lower < nlp.g_upper
-    slacks = (
-        (z - nlp.lower) / units(nlp),
-        (nlp.upper - z) / units(nlp),
-        (g - nlp.g_lower) / nlp.g_scale,
-        (nlp.g_upper - g) / nlp.g_scale,
-    )
-    near = [(slack < NEAR) & (bounded if k < 2 else one_way) for k, slack in enumerate(slacks)]
+    slacks = ((z - nlp.lower) / units(nlp), (nlp.upper - z) / units(nlp), (g - nlp.g_lower) / nlp.g_scale, (nlp.g_upper - g) / nlp.g_scale)
+    # Those with more slack, in scales, are taken to have no multiplier.
+    near = [(slack < 1e-2) & (bounded if k < 2 else one_way) for k, slack in enumerate(slacks)]
     own = identity(len(z), format="csr")
     sides = vstack([own[near[0]], -own[near[1]], dg[near[2]], -dg[near[3]]]).toarray()
     return near, sides, np.maximum(np.concatenate(slacks)[np.concatenate(near)], 0.0)
@@ -214,7 +202,7 @@ def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np
         return found
     s, adjoints = steepest(diags(np.where(measured, 1.0, DEPENDENT)), equations, gradients)
     left = DEPENDENT * s[~measured]
-    if not np.abs(left).max(initial=0.0) <= ADJOINT * np.abs(gradients).max(initial=0.0):
+    if not np.abs(left).max(initial=0.0) <= 1e-6 * np.abs(gradients).max(initial=0.0):
         raise RuntimeError("the equations do not determine the states")
     return s[measured], adjoints
 
@@ -226,7 +214,7 @@ def _by_elimination(
     not determine the states, or where far more equations than states are left."""
     r, states = by_states.shape
     beyond = r - states
-    if not 0 <= beyond <= BEYOND:
+    if not 0 <= beyond <= MOST_BEYOND:
         return None
     # Columns that no structure has make the matrix square; with them, its transpose gives one solution and those of the equations beyond.
     square = hstack([by_states, csc_matrix(np.random.default_rng(0).standard_normal((r, beyond)))], "csc")
@@ -245,24 +233,26 @@ def _by_elimination(
         adjoints += others @ taken
         left -= by_free.T @ (others @ taken)
     missed = np.abs(by_states.T @ adjoints - of_states.T).max(initial=0.0)
-    return (left, adjoints) if missed <= DETERMINED * np.abs(of_states).max(initial=0.0) else None
+    return (left, adjoints) if missed <= 1e-9 * np.abs(of_states).max(initial=0.0) else None
 
 
 def steepest(metric: Any, equations: Any, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The s (n, k) that minimise s'metric s/2 - gradient's where equations s = 0, for k gradients (k, n); and the multipliers (r, k) of the
     equations. metric (n, n), equations (r, n)."""
     r, n = equations.shape
-    exact, regular = (bmat([[metric, equations.T], [equations, diags(np.full(r, -last))]], "csc") for last in (0.0, REGULAR))
+    # Rows may be linearly dependent: refinement removes the effect of the regularisation.
+    exact, regular = (bmat([[metric, equations.T], [equations, diags(np.full(r, -last))]], "csc") for last in (0.0, 1e-12))
     found = _solved(splu(regular), exact, np.vstack([gradients.T, np.zeros((r, len(gradients)))]))
     return found[:n], found[n:]
 
 
 def _solved(factors: SuperLU, matrix: Any, right: np.ndarray, side: str = "N") -> np.ndarray:
-    """The solution of matrix @ solution = right, by the factors of that matrix or one very near to it; with side "T", of its transpose."""
+    """The solution of matrix @ solution = right, by the factors of that matrix or one very near to it (side "T": of its transpose), and by
+    three steps of iterative refinement at most."""
     solution = _each(factors, right, side)
-    for _ in range(REFINEMENTS):
+    for _ in range(3):
         left = right - matrix @ solution
-        if np.abs(left).max(initial=0.0) <= EXACT * np.abs(right).max(initial=0.0):
+        if np.abs(left).max(initial=0.0) <= 1e-12 * np.abs(right).max(initial=0.0):
             break
         solution += _each(factors, left, side)
     return solution
@@ -297,3 +287,44 @@ def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) ->
     candidates = [x, np.maximum(polished, 0.0)]
     found = ((float(np.linalg.norm(M @ c) / c[:m].sum()), c / c[:m].sum()) for c in candidates if c[:m].sum() > 0)
     return min(found, key=lambda one: one[0])
+
+
+def ratio_bounds(conditions: Conditions, i: int, j: int, residual: float) -> tuple[float, float]:
+    """The least and the largest ratio of the weights of objectives j and i, in scales, with which no more than `residual` is left of the
+    conditions; not numbers where neither has a weight. All that lies between does as well. Each takes up to 24 solves of least squares.
+    """
+    if conditions.scaled is None or conditions.scaled[0][[i, j]].max() <= 0.0:
+        return np.nan, np.nan
+    one, other = conditions.scaled[0][[i, j]]
+
+    def largest(i: int, j: int, ratio: float) -> float:
+        return _largest(lambda ratio: ratio_residual(conditions, i, j, ratio) <= residual, ratio)
+
+    if one <= 0.0:
+        return 1.0 / largest(j, i, 0.0), np.inf
+    return 1.0 / largest(j, i, one / other) if other > 0.0 else 0.0, largest(i, j, other / one)
+
+
+def ratio_residual(conditions: Conditions, i: int, j: int, ratio: float) -> float:
+    """What is left of the conditions by the best weights of which that of objective j is so many times that of i; infinity: i has none."""
+    mixed = np.eye(conditions.scaled[0].size if conditions.scaled else 0)
+    share = 1.0 if np.isinf(ratio) else ratio / (1.0 + ratio)
+    mixed[:, i] = (1.0 - share) * mixed[:, i] + share * mixed[:, j]
+    return conditions.residual_of(np.delete(mixed, j, axis=1))
+
+
+def _largest(good: Callable[[float], bool], ratio: float) -> float:
+    """The largest ratio that is good, from one that is, by growing steps and then bisection; infinite where all larger ones are."""
+    if good(np.inf):
+        return float("inf")
+    last, change = ratio, 1e-3
+    for _ in range(12):
+        ahead = last * (1.0 + change) if last > 0.0 else change
+        if not good(ahead):
+            break
+        last, change = ahead, 4.0 * change
+    low, high = last, ahead
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return low

@@ -1,6 +1,13 @@
-"""The program of a scalarisation for IPOPT, with its derivatives, made from those of the NLP."""
+"""Programs for IPOPT: their scaling, their derivatives, made from those of the NLP, and their end when the work is to end early."""
 
 from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Mapping
+from types import FrameType
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -8,14 +15,168 @@ import numpy as np
 from problems.compiled import remembered
 from problems.sampling import refuse_peaks
 
-from ..base import NLP
-from ..stopping import check_stopping
-from .derivatives import gradients, hessian
-from .scaling import ipopt_options, origin
-from .watched import Watched
+from ..base import INFEASIBLE, NLP, TIMEOUT
+from ..stopping import check_stopping, stopping
+from .derivatives import gradients, hessian, objective_gradients
 
+UNASKED = {"calc_lam_p": False, "no_nlp_grad": True, "inputs_check": False}
+"""Sensitivities to the parameters are not used. They would take longer to derive than some solves take, and where rates are no numbers they
+fail, which CasADi prints; so does its check of what goes in, for each program that has more equations than variables."""
+STATUS_OF_IPOPT = {
+    "Infeasible_Problem_Detected": INFEASIBLE,
+    "Maximum_CpuTime_Exceeded": TIMEOUT,
+    "Maximum_WallTime_Exceeded": TIMEOUT,
+    "User_Requested_Stop": TIMEOUT,
+}
+"""The status that a return status of IPOPT means, where it is not just a failure."""
 Options = tuple[tuple[str, object], ...]
 """Options of IPOPT as pairs, which can be remembered by."""
+
+
+class Watched:
+    """A program for IPOPT: called as what `casadi.nlpsol` returns. Its return status is "User_Requested_Stop" where it was asked to end.
+
+    IPOPT looks at its own limits of time between iterations, too: this ends a solve as soon as these could. A factorisation, and the search
+    along one step, cannot be ended.
+    """
+
+    def __init__(self, name: str, parts: Any, options: Mapping[str, Any]) -> None:
+        check_stopping()
+        self._watch = _Watch()
+        self._solver = ca.nlpsol(name, "ipopt", parts, {**UNASKED, **options, "iteration_callback": self._watch})
+
+    def __call__(self, **inputs: Any) -> dict[str, Any]:
+        """The answer, by the names of CasADi. Raises KeyboardInterrupt after Ctrl-C, unless that is handled otherwise."""
+        watch, usual = self._watch, signal.default_int_handler
+        watch.begin()
+        # CasADi would swallow the exception of the usual handler.
+        heard = signal.getsignal(signal.SIGINT) is usual and threading.current_thread() is threading.main_thread()
+        if heard:
+            signal.signal(signal.SIGINT, watch.interrupt)
+        try:
+            answer = self._solver(**inputs)
+        finally:
+            if heard:
+                signal.signal(signal.SIGINT, usual)
+        if watch.raised is not None:
+            raise watch.raised
+        return answer
+
+    def stats(self) -> dict[str, Any]:
+        """Statistics of the last solve, by the names of CasADi."""
+        return self._solver.stats()
+
+
+class _Watch(ca.Callback):
+    """What IPOPT calls after each iteration. It takes no data (its inputs are empty) and, through buffers, no time."""
+
+    def __init__(self) -> None:
+        ca.Callback.__init__(self)
+        self.begin()
+        self.construct("watch", {})
+
+    def begin(self) -> None:
+        """Begin a solve."""
+        self._asked, self._end = time.monotonic(), False
+        self.raised: BaseException | None = None
+
+    def interrupt(self, number: int, frame: FrameType | None) -> None:
+        """Handler of Ctrl-C."""
+        self.raised = KeyboardInterrupt()
+
+    def get_n_in(self) -> int:
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, i: int) -> Any:
+        return ca.Sparsity(0, 0)
+
+    def has_eval_buffer(self) -> bool:
+        return True
+
+    def eval_buffer(self, inputs: Any, outputs: Any) -> int:
+        """EndSlots the solve (1) or not (0)."""
+        try:
+            now = time.monotonic()
+            if now - self._asked >= 0.25:  # s: most solves take less, and need not ask
+                self._asked, self._end = now, stopping()
+        except BaseException as error:  # CasADi would swallow it
+            self.raised = error
+        np.frombuffer(outputs[0])[0] = float(self._end or self.raised is not None)
+        return 0
+
+
+def ipopt_options(seconds: float, max_iterations: int) -> dict[str, Any]:
+    """Options of a CasADi `nlpsol` with IPOPT that prints nothing, raises nothing and ends in time."""
+    return {
+        "print_time": False,
+        "error_on_fail": False,
+        "record_time": False,
+        "show_eval_warnings": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.max_iter": max_iterations,
+        "ipopt.max_wall_time": seconds,
+    }
+
+
+def origin(nlp: NLP) -> np.ndarray:
+    """The origin (n,) of y = (z - origin) / scale: the lower bounds, so that a narrow range far from zero keeps its digits."""
+    return np.where(np.isfinite(nlp.lower), nlp.lower, 0.0)
+
+
+def scaled_bounds(nlp: NLP) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of y, (n,) each. Periodic variables get one more period on either side, so that a bound never stops them."""
+    start = origin(nlp)
+    return (nlp.lower - nlp.period - start) / nlp.scale, (nlp.upper + nlp.period - start) / nlp.scale
+
+
+def back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
+    """A vector (n,) within its bounds: periodic variables wrapped, the others clipped."""
+    out = np.flatnonzero((nlp.period > 0) & ((z < nlp.lower) | (z > nlp.upper)))
+    z = z.copy()
+    z[out] = nlp.lower[out] + np.mod(z[out] - nlp.lower[out], nlp.period[out])
+    return np.clip(z, nlp.lower, nlp.upper)
+
+
+@remembered
+def nlp_scales(nlp: NLP) -> np.ndarray:
+    """Scales of objectives (m,) where no front is known: change by the scales of all variables, median over 31 places; else 1."""
+    rng, count = np.random.default_rng(0), 31
+    lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
+    Z = lower + rng.random((count, len(lower))) * (upper - lower)
+    slopes = np.array(objective_gradients(nlp)(Z.T)).reshape(-1, count, len(lower))
+    sizes = np.median(np.nan_to_num(np.abs(slopes) @ nlp.scale, posinf=0.0), axis=1)
+    # Slopes of an objective that changes by less than this part of its size are rounding errors.
+    least = 1e-12 * np.median(np.nan_to_num(np.abs(nlp.evaluate(Z)[0]), posinf=0.0), axis=0)
+    return np.where(sizes > least, sizes, 1.0)
+
+
+@remembered
+def _places(nlp: NLP) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the derivatives of g that may differ from 0."""
+    i, j = gradients(nlp).sparsity_out(1).get_triplet()
+    return np.array(i, dtype=int), np.array(j, dtype=int)
+
+
+def equilibrated(nlp: NLP, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Scales of the variables (n,) and of the rows (r,) by which the largest derivative in each row and each column is near one at z.
+
+    Ruiz, "A scaling algorithm to equilibrate both rows and columns norms in matrices", RAL-TR-2001-034. Bounds may be much wider than what
+    a variable does: its scale may become less than its own, never more.
+    """
+    sizes = np.abs(np.array(gradients(nlp)(z)[1].nonzeros()))
+    sizes[~np.isfinite(sizes)] = 0.0
+    i, j = _places(nlp)
+    columns, rows = nlp.scale.copy(), nlp.g_scale.copy()
+    for _ in range(5):
+        for scales, index, power in ((rows, i, 0.5), (columns, j, -0.5)):
+            largest = np.zeros(len(scales))
+            np.maximum.at(largest, index, sizes * columns[j] / rows[i])
+            scales *= np.where(largest > 0, largest, 1.0) ** power
+    return np.clip(columns, 1e-3 * nlp.scale, nlp.scale), np.clip(rows, 1e-3 * nlp.g_scale, 1e2 * nlp.g_scale)
 
 
 def program_parameters(shift: np.ndarray, inverse: np.ndarray, slope: np.ndarray, variables: np.ndarray, rows: np.ndarray) -> np.ndarray:

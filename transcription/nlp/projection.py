@@ -25,22 +25,18 @@ from ..numerics.polynomials import basis_matrix, gauss_legendre
 from ..trajectories.trajectory import Trajectory
 from .optimality import DEPENDENT, Conditions, Linearised, steepest, units
 
-TIGHT, CLOSE = 1e-6, 1e-4
-"""Inequalities with no more slack than the first, in their scales, are active; held are those with a multiplier larger than this and their
-slack, and no more slack than the second: where limits nearly depend on each other, multipliers are found for others nearby, too."""
-STEP = 1e-3
+TIGHT_SLACK = 1e-6
+"""Inequalities with no more slack than this, in their scales, are active."""
+CONTROL_STEP = 1e-3
 """By how much coefficients of controls are moved, in spans, to see what they do: controls are linear in them."""
-FLOOR = 1e-4
-"""Part of the longest of all gradients that every gradient is taken to have."""
-RELEASED, EXACT = 1e-4, 1e-6
+RELEASED = 1e-4
 """Change of what is active, in its scales, by a variation of length one, below which it need not stay so: a hundredth of that length is
-still a large step, and points are feasible to 1e-6; and where it is asked what is left of gradients at an optimum."""
+still a large step, and points are feasible to 1e-6."""
 
 
 @dataclass(frozen=True, eq=False)
-class Projection:
-    """The objectives' gradients at a vector of an NLP, projected on what is active there: a tangent space where all of that has a
-    multiplier, else a cone, since what has none may be left."""
+class TangentProjection:
+    """The objectives' gradients at a vector, projected on the tangent space, or cone, of the constraints that are active there."""
 
     nlp: NLP
     scales: np.ndarray  # (m,): Of the objectives
@@ -59,8 +55,7 @@ class Projection:
         return np.linalg.norm(self.columns[:, : len(self.scales)], axis=0)
 
     def fall(self, combination: np.ndarray) -> np.ndarray:
-        """By how much the objectives fall (m,), in their scales, along the steepest descent of a combination (m,) of them, of which the
-        length is its slope."""
+        """By how much the objectives fall (m,), in scales, along the steepest descent of a combination (m,), whose length is its slope."""
         return self._nearly[0].T @ _on_cone(combination, self._nearly)[0]
 
     def descent(self, combination: np.ndarray) -> np.ndarray:
@@ -72,13 +67,11 @@ class Projection:
         return -units(self.nlp) * (self.variations @ np.concatenate([combination, -of_held, -of_loose]))
 
     def slope(self, combination: np.ndarray) -> float:
-        """How fast a combination (m,) of the objectives can fall: its slope along its steepest descent, as a part of the longest of the
-        gradients that it combines; 0 where it cannot."""
+        """The slope of a combination (m,) along its steepest descent, as a part of the longest gradient in it; 0 where none can fall."""
         return self._part(combination, self._nearly)
 
     def left(self, weights: np.ndarray) -> float:
-        """What is left of the sum of the gradients, each times its weight (m,), as a part of the longest: 0 at a Pareto optimum with these
-        weights."""
+        """What is left of the weighted (m,) sum of gradients, as a part of the longest: 0 at a Pareto optimum with these weights."""
         return self._part(weights, self._exactly)
 
     @cached_property
@@ -87,7 +80,7 @@ class Projection:
 
     @cached_property
     def _exactly(self) -> tuple[np.ndarray, np.ndarray]:
-        return self._beside(EXACT)
+        return self._beside(1e-6)
 
     def _beside(self, released: float) -> tuple[np.ndarray, np.ndarray]:
         """The gradients of the objectives (q, m) and of what may be left (q, l) beside what is held."""
@@ -101,14 +94,13 @@ class Projection:
 
     def _part(self, combination: np.ndarray, beside: tuple[np.ndarray, np.ndarray]) -> float:
         shares = np.abs(combination)
-        # Where the gradients are next to nothing, at an optimum that nothing holds, the others'.
-        longest = (shares * self.free).max() + FLOOR * shares.sum() * self.free.max()
+        # Where the gradients are next to nothing, at an optimum that nothing holds, a part of the others'.
+        longest = (shares * self.free).max() + 1e-4 * shares.sum() * self.free.max()
         return float(np.linalg.norm(_on_cone(combination, beside)[0])) / (longest or 1.0)
 
 
 def _on_cone(combination: np.ndarray, beside: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """What is left (q,) of the gradient of a combination on the cone, and the multipliers (l,) of what may be left: not negative, they take
-    the most of it."""
+    """What the cone leaves (q,) of the gradient of a combination, and the multipliers (l,), not negative, that take the most of it."""
     objectives, loose = beside
     target, lengths = objectives @ combination, np.linalg.norm(loose, axis=0)
     used, multipliers = lengths > 0, np.zeros(len(lengths))
@@ -117,7 +109,7 @@ def _on_cone(combination: np.ndarray, beside: tuple[np.ndarray, np.ndarray]) -> 
     return target - loose @ multipliers, multipliers
 
 
-def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> Projection | None:
+def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> TangentProjection | None:
     """The projection at a feasible vector (n,), for objectives in `F_scales` (m,), see `optimality`; None where a derivative is no number,
     or no multipliers are found.
 
@@ -129,9 +121,10 @@ def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> P
         return None
     linear, (weights, multipliers) = conditions.linear, conditions.scaled
     dF, sides, roots = linear.of_objectives, linear.of_inequalities, metric_roots(linear)
-    tight = linear.slack <= TIGHT
+    tight = linear.slack <= TIGHT_SLACK
     bounding = tight & sides[:, np.isinf(nlp.span)].any(axis=1)
-    held = (multipliers > np.maximum(linear.slack, TIGHT)) & (linear.slack <= CLOSE) & ~bounding
+    # Where limits nearly depend on each other, multipliers are found for others nearby, too: up to a hundred times the slack.
+    held = (multipliers > np.maximum(linear.slack, TIGHT_SLACK)) & (linear.slack <= 1e-4) & ~bounding
     loose = tight & ~held & ~bounding
     every = np.vstack([dF, sides[held], sides[loose]])
     try:
@@ -140,7 +133,7 @@ def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> P
         s, _ = steepest(measure, equations, every)
     except RuntimeError:
         return None
-    return Projection(nlp, linear.scales, weights, s, roots @ s, int(np.count_nonzero(held)), conditions)
+    return TangentProjection(nlp, linear.scales, weights, s, roots @ s, int(np.count_nonzero(held)), conditions)
 
 
 def _held(columns: np.ndarray, released: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -162,8 +155,7 @@ def metric_roots(linear: Linearised) -> csr_matrix:
 
 
 def _controls(nlp: NLP, z: np.ndarray) -> csr_matrix:
-    """Matrix (q, n) of all controls, in spans, at Gauss-Legendre nodes of their polynomials, each times the root of its weight in the mean
-    over its phase, by the variables in `units`."""
+    """Matrix (q, n): controls in spans at Gauss-Legendre nodes, times the root of their weight in the phase's mean, by the variables."""
     here, place = nlp.unpack(z), {profile.name: profile.columns for profile in nlp.profiles}
     rows: list[np.ndarray] = []
     columns: list[np.ndarray] = []
@@ -182,7 +174,7 @@ def _controls(nlp: NLP, z: np.ndarray) -> csr_matrix:
             for trajectory, column in zip(moved, place.get(f"{phase.name}.{variable.name}", ()), strict=False):
                 change = trajectory[phase.name].control.coefficients[:, :, i] - control.coefficients[:, :, i]
                 elements = np.flatnonzero(change.any(axis=1))
-                at = roots[elements] * (change[elements] @ basis.T) / (STEP * variable.span)
+                at = roots[elements] * (change[elements] @ basis.T) / (CONTROL_STEP * variable.span)
                 rows.append((first + elements[:, None] * len(nodes) + np.arange(len(nodes))).ravel())
                 columns.append(np.full(at.size, nlp.free[column]))
                 values.append(at.ravel())
@@ -195,5 +187,5 @@ def _moved(nlp: NLP, z: np.ndarray, k: int) -> Trajectory:
     """The trajectory with the k-th coefficient of each control moved by a step: each control has its own, so that all move at once."""
     moving = nlp.free[[profile.columns[k] for profile in nlp.profiles if k < len(profile.columns)]]
     other = z.copy()
-    other[moving] += STEP * nlp.span[moving]
+    other[moving] += CONTROL_STEP * nlp.span[moving]
     return nlp.unpack(other)

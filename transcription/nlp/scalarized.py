@@ -17,28 +17,8 @@ import numpy as np
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import Stopped, stopping
 from .optimality import optimality
-from .program import Options, program_parameters, solver
-from .scaling import STATUS_OF_IPOPT, back_in_bounds, equilibrated, gradients, nlp_scales, origin
+from .program import STATUS_OF_IPOPT, Options, back_in_bounds, equilibrated, gradients, nlp_scales, origin, program_parameters, solver
 
-ACCURACY = 1e-9
-"""IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs."""
-PEAK_LIMIT = 3.0
-"""Multiple of their scale, or of their value at the start, up to which peaks may rise: nothing else bounds those that are not minimised."""
-SLACK = 1e-2
-"""Part of the tolerance by which bounds of states, and rows that are no equalities, give way: where a trajectory begins or ends on one, or
-runs along it, nothing is strictly inside, multipliers have no limit, and an interior point method does not converge."""
-AT_END, RESTARTS = 1e-2, 3
-"""Distance, in widths of its box, at which an end of it counts as what stops a variable; most restarts for that."""
-USEFUL = 1e-4
-"""Residual of the conditions of optimality, see `optimality`, up to which a feasible vector is a solution, however its solve ended: in the
-objective's own size, how much of it could be gained over a whole span of the variables."""
-LITTLE = 1e-4
-"""Part of what an objective could change by that counts as one unit of it at least, where it is near zero."""
-ABSURD = 1e12
-"""Multiple of what counts as one unit of an objective at the start, and of 1, from which on its usual scale is that of an explosion
-somewhere in the box: in it the objective would be nothing."""
-LEAST = 100
-"""Fewest iterations for which a strategy is worth beginning, if there may be as many."""
 AT_LIMIT = "maximum iterations exceeded"
 IN_BOX = "it stopped at ends of the boxes around where it began"
 """Message of a solve that could have gone on."""
@@ -46,20 +26,42 @@ SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 
 @dataclass(frozen=True)
+class SolveNumbers:
+    """Numbers of a gradient solve, as measured on the standard problems and the re-entries."""
+
+    accuracy: float = 1e-9  # IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs
+    # Multiple of their scale, or of their value at the start, up to which peaks may rise: nothing else bounds those not minimised.
+    peak_limit: float = 3.0
+    # Part of the tolerance by which bounds of states, and rows that are no equalities, give way: where a trajectory begins or ends on one,
+    # or runs along it, nothing is strictly inside, multipliers have no limit, and an interior point method does not converge.
+    slack: float = 1e-2
+    restarts: int = 3  # from where a variable was stopped by an end of its box
+    # Residual of the conditions of optimality up to which a feasible vector is a solution, however its solve ended: in the objective's own
+    # size, how much of it could be gained over a whole span of the variables.
+    useful: float = 1e-4
+    # Multiple of what counts as one unit of an objective at the start, and of 1, from which on its usual scale is that of an explosion
+    # somewhere in the box: in it the objective would be nothing.
+    absurd: float = 1e12
+    least_iterations: int = 100  # for which a strategy is worth beginning, if there may be as many
+
+
+SOLVE = SolveNumbers()
+
+
+@dataclass(frozen=True)
 class _Strategy:
-    """A strategy of IPOPT: its options, the share of the iterations that it may take, how far free variables may move in spans, whether
-    alpha may not exceed the start's, and whether variables and rows are equilibrated."""
+    """A strategy of IPOPT and what it is allowed."""
 
     options: Options
-    share: float
-    radius: float = np.inf
-    held: bool = False
-    equilibrated: bool = True
+    share: float  # of the iterations
+    radius: float = np.inf  # how far free variables may move, in spans
+    held: bool = False  # whether alpha may not exceed the start's
+    equilibrated: bool = True  # whether variables and rows are
 
 
 COMMON: Options = (
-    ("tol", ACCURACY),
-    ("acceptable_tol", 100 * ACCURACY),
+    ("tol", SOLVE.accuracy),
+    ("acceptable_tol", 100 * SOLVE.accuracy),
     ("nlp_scaling_method", "none"),
     ("bound_relax_factor", 0.0),
     ("fast_step_computation", "yes"),
@@ -67,10 +69,6 @@ COMMON: Options = (
     ("mumps_pivot_order", 0),
 )
 """Options of all strategies: what is scaled already needs neither scaling nor refinement."""
-SCALED, UNCHANGED = 77, 0
-"""Scaling of matrices by MUMPS, which takes some per cent of an iteration. Where limits of objectives leave nothing strictly inside, from
-feasible starts for several objectives, and from starts that are drawn, iterations with matrices that are not scaled may take many times as
-long: some 30 times on the skip entry."""
 ADAPTIVE = _Strategy((("mu_strategy", "adaptive"),), share=0.24)
 """Few iterations from good points and poor ones, where it works at all."""
 NEAR = _Strategy(
@@ -111,12 +109,12 @@ class Solved:
 
 @dataclass(frozen=True)
 class _Settings:
-    """The settings of a program; `scaling` is that of matrices, see `SCALED`."""
+    """The settings of a program."""
 
     tolerance: float
     max_iterations: int
     seconds: float
-    scaling: int
+    scaled: bool  # whether MUMPS scales its matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +164,7 @@ def scalarize(
     persistent: bool = True,
     near: bool = False,
 ) -> Solved:
-    """Go down from a point to the front: least alpha with F - reference <= alpha weights. start (n,), reference, weights (m,), ceiling
-    (m,), margin (r,)."""
+    """Go down from a start (n,) to the front: least alpha with F - reference <= alpha weights (m,); ceiling (m,), margin (r,)."""
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     if stopping():
         return not_begun(nlp, start)
@@ -181,13 +178,16 @@ def scalarize(
     # With a margin, a start that misses it is not to be kept.
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     drawn, several = not (persistent or feasible or near), np.count_nonzero(task.used) > 1
-    scaling = SCALED if task.limited or drawn or (feasible and several) else UNCHANGED
-    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), scaling)
+    # Scaling by MUMPS takes some per cent of an iteration. Where limits of objectives leave nothing strictly inside, from feasible starts
+    # for several objectives, and from starts that are drawn, iterations without may take many times as long: 30 times on the skip entry.
+    scaled = task.limited or drawn or (feasible and several)
+    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled))
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
         left = max_iterations - sum(solved.iterations for solved in found)
-        share = max_iterations if not (found or persistent) else max(min(LEAST, max_iterations), int(strategy.share * max_iterations))
-        if left < min(LEAST, share):
+        least = min(SOLVE.least_iterations, max_iterations)
+        share = max(least, int(strategy.share * max_iterations)) if found or persistent else max_iterations
+        if left < min(least, share):
             break
         # What is feasible and ran out of iterations, or of its box, goes on, scaled anew.
         unended = (IN_BOX,) if feasible else (IN_BOX, AT_LIMIT)
@@ -203,22 +203,21 @@ def scalarize(
     if best.status in (FAILED, INFEASIBLE) and len(task.used) == 1 and max(best.violation, task.excess(best.F)) <= tolerance:
         # Of several objectives, the certificate would not know which was asked for.
         residual = optimality(nlp, best.z, _own_scales(nlp, best.z, best.F))
-        if residual <= USEFUL:
+        if residual <= SOLVE.useful:
             best, message = replace(best, status=CONVERGED), f"{message}; the conditions of optimality hold to {residual:.0e}"
     return replace(best, iterations=iterations, clocked=found[-1].clocked, message=message)
 
 
 def _strategies(feasible: bool, tightened: bool) -> tuple[_Strategy, ...]:
-    """What is tried, one after the other, from a start that is feasible or not, or that only misses margins."""
+    """The strategies in their order, from a start that is feasible or not, or that only misses margins."""
     return (INSIDE, ADAPTIVE, MONOTONE) if tightened else (ADAPTIVE, NEAR if feasible else UNSCALED, MONOTONE)
 
 
 def _own_scales(nlp: NLP, z: np.ndarray, F: np.ndarray) -> np.ndarray:
-    """What counts as one in each objective (m,) at a vector: its size there, and a little of what it could change by; no more than its
-    usual scale, which exponentials make huge somewhere in a wide box."""
+    """What counts as one in objectives (m,) at a vector: their size, 1e-4 of their change where near zero, no more than usual."""
     usual = nlp_scales(nlp)
     change = np.abs(np.nan_to_num(np.array(gradients(nlp)(z)[0]))) @ nlp.scale
-    own = np.maximum(np.abs(F), LITTLE * change)
+    own = np.maximum(np.abs(F), 1e-4 * change)
     return np.minimum(usual, np.where(own > 0, own, usual))
 
 
@@ -253,9 +252,9 @@ def _task(
     alpha = np.max((F[moving] - reference[moving]) / weights[moving])
     shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
     scale = nlp_scales(nlp)
-    if (scale > ABSURD).any():
+    if (scale > SOLVE.absurd).any():
         own = _own_scales(nlp, start, F)
-        scale = np.where(scale > ABSURD * np.maximum(own, 1.0), own, scale)
+        scale = np.where(scale > SOLVE.absurd * np.maximum(own, 1.0), own, scale)
     slope = np.where(moving, weights, 0.0) / scale
     lower, upper = nlp.g_lower / nlp.g_scale, nlp.g_upper / nlp.g_scale
     inside = np.minimum(inside, 0.5 * (upper - lower))
@@ -263,9 +262,9 @@ def _task(
 
 
 def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> Solved:
-    """A run of IPOPT, and more from where it stopped, as long as that is an end of a box that the problem does not have."""
+    """Runs of IPOPT, each from where the last one stopped, as long as that is an end of a box that the problem does not have."""
     iterations = 0
-    for _ in range(RESTARTS + 1):
+    for _ in range(SOLVE.restarts + 1):
         solved, stuck = _attempt(nlp, task, start, settings, strategy)
         iterations += solved.iterations
         if not stuck or solved.clocked or iterations >= settings.max_iterations:
@@ -279,14 +278,14 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
     """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
     tolerance = settings.tolerance
-    options = (*COMMON, ("mumps_scaling", settings.scaling), ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
+    options = (*COMMON, ("mumps_scaling", 77 if settings.scaled else 0), ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
         columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
         run = solver(nlp, settings.seconds, settings.max_iterations, options)
     except Stopped:
         return not_begun(nlp, start), False
     lower, upper, made_up = _box(nlp, start, strategy.radius)
-    slack = min(1e-8, SLACK * tolerance)
+    slack = min(1e-8, SOLVE.slack * tolerance)
     states = np.where(made_up, 0.0, slack * nlp.scale)
     states[:, nlp.free] = 0.0
     ways = np.where(nlp.g_lower < nlp.g_upper, slack, 0.0)
@@ -305,7 +304,8 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     # Where IPOPT does not begin, nothing is written there.
     iterations = int(stats["iter_count"]) if 0 <= stats["iter_count"] <= settings.max_iterations else 0
     z = zero + np.array(answer["x"]).ravel()[:-1] * columns
-    stuck = bool((made_up & (np.stack([z - lower, upper - z]) < AT_END * np.where(made_up, upper - lower, 0.0))).any())
+    # An end of the box that is nearer than a hundredth of its width is what stopped a variable.
+    stuck = bool((made_up & (np.stack([z - lower, upper - z]) < 0.01 * np.where(made_up, upper - lower, 0.0))).any())
     z = nlp.tighten(back_in_bounds(nlp, z)[None])[0]
     F, violation = nlp.evaluate(z[None])
     status = STATUS_OF_IPOPT.get(outcome, FAILED)
@@ -315,28 +315,21 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     elif outcome in SOLVED:
         status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
     message = "" if status == CONVERGED else outcome.replace("_", " ").lower()
-    if outcome in SOLVED and status != CONVERGED:
-        # To IPOPT, it is solved.
-        missed = max(violation[0], task.excess(F[0]))
-        message = (
-            f"it ended where limits are exceeded by {missed:.1e} of their scales" if status == INFEASIBLE else "it ended at no numbers"
-        )
+    if outcome in SOLVED and status == FAILED:
+        message = "it ended at no numbers"
+    elif outcome in SOLVED and status == INFEASIBLE:
+        message = f"it ended where limits are exceeded by {max(violation[0], task.excess(F[0])):.1e} of their scales"
     clocked = STATUS_OF_IPOPT.get(outcome) == TIMEOUT
-    multipliers = _multipliers(np.array(answer["lam_g"]).ravel(), rows, task.scale)
+    of_rows, moving, resting = np.split(np.array(answer["lam_g"]).ravel(), np.cumsum([len(rows), len(task.scale)]))
+    multipliers = np.concatenate([(moving + resting) / task.scale, of_rows / rows])
     return Solved(z, F[0], float(violation[0]), status, iterations, clocked, message=message, multipliers=multipliers), stuck
-
-
-def _multipliers(found: np.ndarray, rows: np.ndarray, scales: np.ndarray) -> np.ndarray:
-    """See `Solved.multipliers`, from those of the program's rows, by the scales of the NLP's rows (r,) and of the objectives (m,)."""
-    of_rows, moving, resting = np.split(found, np.cumsum([len(rows), len(scales)]))
-    return np.concatenate([(moving + resting) / scales, of_rows / rows])
 
 
 def _box(nlp: NLP, z: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Bounds of the variables around z, (n,) each, and which of them the problem does not have, (2, n). Periodic variables get one more
     period on either side, so that a bound never stops them; peaks, which have none, a multiple of what they are."""
     lower, upper = nlp.lower - nlp.period, nlp.upper + nlp.period
-    upper = np.where(np.isinf(upper), PEAK_LIMIT * np.maximum(nlp.scale, np.abs(z)), upper)
+    upper = np.where(np.isinf(upper), SOLVE.peak_limit * np.maximum(nlp.scale, np.abs(z)), upper)
     reach = np.full(len(z), np.inf)
     reach[nlp.free] = radius * nlp.span[nlp.free]
     low, high = np.maximum(lower, z - reach), np.minimum(upper, z + reach)

@@ -1,25 +1,112 @@
-"""CasADi Functions called for many columns at once: without copies, and compiled once that pays."""
+"""CasADi Functions called for many columns at once: without copies, and compiled by the C compiler of this machine once that pays."""
 
 from __future__ import annotations
 
 import logging
 import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from .compiling import compiled_form, compiler
+from ..stopping import stopping
 
-PAYS, TYPICAL = 30_000_000, 1500
-"""Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function is worth compiling that has so many; in
-proportion for longer ones."""
-LONG = 20_000
+COMPILER_SECONDS = 30.0
+"""Time after which a compiler is taken to hang; the longest Functions that are compiled need a few seconds."""
+
+log = logging.getLogger(__name__)
+_useless: set[str] = set()
+"""Commands that hung, or cannot be run, in this process."""
+
+
+def compiler() -> str | None:
+    """The C compiler of this machine that Functions are compiled with; None if they are not, or there is none that works."""
+    if os.environ.get("MACS_COMPILE", "1") == "0":
+        return None
+    command = os.environ.get("CC", "").strip() or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    return None if command in _useless else command
+
+
+def compiled_form(function: ca.Function) -> ca.Function | None:
+    """The Function compiled; None where there is no compiler, it fails or hangs, or the work is to end early (`stopping`)."""
+    command = compiler()
+    if not command:
+        return None
+    try:
+        with tempfile.TemporaryDirectory(prefix="macs_", ignore_cleanup_errors=True) as folder:
+            generator = ca.CodeGenerator("compiled.c")
+            try:
+                generator.add(function)
+                generator.generate(folder + os.sep)
+            except RuntimeError as error:  # it has parts that are no C code, such as a Callback
+                log.info("%s is not compiled: %s", function.name(), error)
+                return None
+            if not _run(command, Path(folder)):
+                return None
+            return ca.external(function.name(), str(Path(folder) / "compiled.so"))
+    except (OSError, RuntimeError) as error:  # no folder for temporary files, or none from which a library can be loaded
+        _give_up(command, str(error))
+        return None
+
+
+def _run(command: str, folder: Path) -> bool:
+    """Compile compiled.c to compiled.so; False if the work is to end before. Raises OSError if there is no compiled.so then."""
+    # Contracted or reordered operations would round differently.
+    options = ["-shared", "-fPIC", "-O1", "-ffp-contract=off"]
+    words = [*command.split(), *options, "compiled.c", "-o", "compiled.so", "-lm"]
+    said = folder / "said.txt"
+    with said.open("wb") as file:
+        # In a session of its own, so that it ends with all processes that it started, and Ctrl-C is for this process alone.
+        process = subprocess.Popen(
+            words, cwd=folder, stdin=subprocess.DEVNULL, stdout=file, stderr=file, start_new_session=hasattr(os, "killpg")
+        )
+    began = time.monotonic()
+    try:
+        while process.poll() is None:
+            if stopping():
+                return False
+            if time.monotonic() - began > COMPILER_SECONDS:
+                raise TimeoutError(f"it did not end within {COMPILER_SECONDS:g} s")
+            try:
+                process.wait(0.05)
+            except subprocess.TimeoutExpired:
+                continue
+    finally:
+        _end(process)
+    if process.returncode != 0 or not (folder / "compiled.so").is_file():
+        lines = said.read_text(errors="replace").strip().splitlines()
+        raise OSError(f"it ended with {process.returncode}" + (f": {lines[-1]}" if lines else ""))
+    return True
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End the process, and those that it started, if it has not ended."""
+    if process.poll() is None:
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+        process.wait()
+
+
+def _give_up(command: str, reason: str) -> None:
+    """Note that Functions stay interpreted from now on: a compiler that failed once would fail again."""
+    _useless.add(command)
+    log.warning("functions are not compiled, and take more time: %s: %s", command, reason)
+
+
+LONGEST_COMPILED = 20_000
 """Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
 BLOCK = 64
 """Most calls at once: each number of them needs a Function of its own."""
-WORTH = 24
+WORTH_A_BLOCK = 24
 """Calls of a block of so many from which on all of them, by a wide Function, take less time."""
 
 
@@ -40,7 +127,8 @@ class Batched:
         self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
         self._width = 0
         self._may_compile = compiled and compiler() is not None
-        self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else PAYS
+        # Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function of 1500 is worth compiling.
+        self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else 30_000_000
         self._work, self.instructions, self._length = 0, work(function), _length(function)
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
@@ -52,15 +140,15 @@ class Batched:
         arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
         outputs = self._evaluate(arrays, k)
         self._work += k * self.instructions
-        if self._may_compile and self._work * TYPICAL > self._pays * max(self._length, TYPICAL):
+        if self._may_compile and self._work * 1500 > self._pays * max(self._length, 1500):
             self._compile(arrays, outputs)
         return outputs
 
     def _evaluate(self, arrays: list[np.ndarray], k: int) -> list[np.ndarray]:
-        if self._wide and not self._width and k >= WORTH:
+        if self._wide and not self._width and k >= WORTH_A_BLOCK:
             self._width = -(-k // -(-k // BLOCK))
         most = self._width or BLOCK
-        if self._wide and k % most and k % most * BLOCK >= WORTH * most:
+        if self._wide and k % most and k % most * BLOCK >= WORTH_A_BLOCK * most:
             # Fill the last block up, and leave out what is too much again.
             filled = [np.concatenate([values, np.repeat(values[-len(values) // k :], most - k % most, axis=0)]) for values in arrays]
             return [values[:k] for values in self._evaluate(filled, k + most - k % most)]
@@ -89,7 +177,7 @@ class Batched:
     def _compile(self, arrays: list[np.ndarray], expected: list[np.ndarray]) -> None:
         """Replace the Function by its compiled form, if there is one and it agrees to the last bit."""
         self._may_compile = False
-        if self._length > LONG:
+        if self._length > LONGEST_COMPILED:
             return
         interpreted = self._function, self._blocks, self._wide, self._width
         library = compiled_form(self._function)

@@ -137,10 +137,7 @@ def _lagrange(points: np.ndarray, weights: np.ndarray, tau: np.ndarray) -> np.nd
 
 @cache
 def monomials(basis: str, degree: int) -> np.ndarray:
-    """The functions of a basis as sums of monomials, (degree + 1, degree + 1): their values at tau are [1, tau, ..., tau^degree] @ this.
-
-    Of moderate degrees only: the more, the more digits are lost.
-    """
+    """A basis as sums of monomials, (degree + 1, degree + 1): [1, tau, ...] @ this. The higher the degree, the more digits are lost."""
     places = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     found = np.linalg.solve(np.vander(places, increasing=True), basis_matrix(basis, degree, places))
     found.setflags(write=False)

@@ -16,14 +16,11 @@ import numpy as np
 from problems.compiled import CompiledPhase, remembered
 
 from ..numerics.batched import Batched, expanded
-from ..numerics.periodic import wrapped
 from ..numerics.polynomials import gauss_legendre, lagrange_integrals, lobatto_nodes
-from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
 
 STAGES = 5
 """Of the collocation, on each piece between two nodes or ends of elements."""
-SAME = 1e-10
-"""Times nearer to each other than this, in durations of the phase, are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,17 +38,13 @@ class PhaseMultipliers:
 
 @dataclass(frozen=True, eq=False)
 class Adjoint:
-    """Costates of one phase on their own elements, and their error where it is known: the largest difference from what the multipliers say
-    at t0, and where it is known at the end of each element, as a part of the largest costate, all in scales of their states."""
+    """Costates of a phase, and their largest error where it is known, as a part of the largest costate, in scales of states."""
 
     costates: PiecewisePolynomial
     error: float | None = None
 
     def beside(self, known: PiecewisePolynomial, units: np.ndarray) -> Adjoint:
-        """The same, with the error that they have beside costates of the method where its elements end; states are in these units.
-
-        There a method has jumps of its coefficients before its own costate or after it: any value within a jump is right.
-        """
+        """The same with its error beside the method's own costates, which at ends of elements have a jump: any value in it is right."""
         begin, end = self.costates.ends()
         k = np.abs(self.costates.edges[:, None] - known.edges[1:-1]).argmin(axis=0)
         before, after, own = end[k - 1], begin[k], known.ends()[1][:-1]
@@ -61,8 +54,7 @@ class Adjoint:
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """What multipliers say of costates: their values (nx,) at tf and t0, and by how much (k, nx) they fall at places (k,) in [0, 1], by
-    jumps there and spread about these places; what falls at the ends themselves does so within the phase."""
+    """What multipliers say of costates: values (nx,) at tf and t0; falls (k, nx) at places (k,) in [0, 1], sharp and spread."""
 
     final: np.ndarray
     initial: np.ndarray
@@ -125,8 +117,7 @@ def _slopes(phase: CompiledPhase) -> Batched:
 
 
 def _cells(times: np.ndarray, falls: np.ndarray, trajectory: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
-    """The ends of cells (k + 1,) about these times, halfway between them, and how steeply (k, nx) costates fall in each; one cell over the
-    whole phase where nothing falls."""
+    """Ends of cells (k + 1,) about these times, and how steeply (k, nx) costates fall in each; one cell where nothing falls."""
     whole = np.array([trajectory.t0, trajectory.tf])
     if not falls.any():
         return whole, np.zeros((1, falls.shape[1]))
@@ -142,7 +133,8 @@ def _pieces(trajectory: PhaseTrajectory, times: np.ndarray, jumps: np.ndarray, f
     """The ends of pieces (N + 1,) within which states, controls and costates are smooth, and the jumps (N + 1, nx) there."""
     every = np.sort(np.concatenate([trajectory.state.edges, trajectory.control.edges, times, further]))
     every = np.clip(every, trajectory.t0, trajectory.tf)
-    apart = np.diff(every) > SAME * (trajectory.tf - trajectory.t0)
+    # Times that are nearer to each other, in durations of the phase, are one.
+    apart = np.diff(every) > 1e-10 * (trajectory.tf - trajectory.t0)
     edges = every[np.append(True, apart)]
     edges = edges if len(edges) > 1 else np.array([trajectory.t0, trajectory.tf])
     edges[[0, -1]] = trajectory.t0, trajectory.tf

@@ -88,8 +88,7 @@ class Layout:
         return ca.reshape(extended[self.index(slots).tolist()], *shape) if slots.size else ca.MX(*shape)
 
     def replaced(self, extended: ca.MX, slots: np.ndarray, values: ca.MX, *, constants: bool = False) -> ca.MX:
-        """A symbol of extended rows in which those among `slots` are the rows of `values`; constants stay what they are, unless they are
-        to be replaced too. It is one permutation: to split rows and join them again would cost far more."""
+        """A symbol of extended rows in which those among `slots` are `values`, by one permutation; constants stay, unless `constants`."""
         total, kept = extended.shape[0], np.flatnonzero((slots.ravel() >= 0) | constants)
         places = np.arange(total)
         places[self.index(slots)[kept]] = total + kept
@@ -104,8 +103,7 @@ class Layout:
 
 @contextmanager
 def _uncollected() -> Iterator[None]:
-    """Python's garbage collector is paused: a table of variables has no reference cycles, and the collector would scan all of a long one
-    many times while it is made."""
+    """Pauses the garbage collector, which would scan a long table of variables many times while it is made."""
     enabled = gc.isenabled()
     gc.disable()
     try:

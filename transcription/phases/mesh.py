@@ -12,10 +12,6 @@ from problems.checks import check_count
 
 SHORTEST = 1e-9
 """Shortest element, relative to its phase: below, its length is mostly rounding."""
-REACH, FAR = 0.45, 0.9
-"""How far a moving edge may go towards the next one, as a fraction of the distance: where that moves too, and where it stays."""
-SAME = 1e-9
-"""Largest difference between the same edge in a mesh and in its trajectory, relative to the phase: of rounding, of times far from 0 too."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,8 +56,7 @@ class PhaseMesh:
 
     @classmethod
     def of(cls, given: Any) -> PhaseMesh:
-        """From what a user writes, (edges, order) and perhaps more, or a file, a mapping of these names. Raises ValueError for anything
-        else."""
+        """From (edges, order) and perhaps more, or a mapping of these names. Raises ValueError for anything else."""
         if isinstance(given, PhaseMesh):
             return given
         try:
@@ -76,10 +71,7 @@ class PhaseMesh:
 
     @property
     def places(self) -> np.ndarray:
-        """The edges (N + 1,) in mean lengths of an element, from 0 to N.
-
-        Those of equal elements are whole numbers, exactly, however the edges were rounded: so that their equations are the same bits.
-        """
+        """The edges (N + 1,) in mean lengths of an element; exactly whole numbers for equal elements, so that bits are the same."""
         places = self.elements * np.array(self.edges)
         whole = np.rint(places)
         return np.where(np.abs(places - whole) < 1e-15 * self.elements, whole, places)
@@ -95,7 +87,7 @@ class PhaseMesh:
         return (places[:-1, None] + 0.5 * (1.0 + np.asarray(nodes)) * np.diff(places)[:, None]) / self.elements
 
     @property
-    def knots(self) -> tuple[int, ...]:
+    def _ends_of_arcs(self) -> tuple[int, ...]:
         """Indices (m + 2,) of the moving edges and the two ends."""
         return (0, *self.moving, self.elements)
 
@@ -105,20 +97,17 @@ class PhaseMesh:
         return np.searchsorted(self.moving, np.arange(self.elements), side="right")
 
     def ranges(self) -> np.ndarray:
-        """Bounds (m, 2) of the places of the moving edges, relative to the phase.
-
-        Two neighbours may each use less than half of what lies between them, so that they never meet; beside an end there is more room.
-        """
-        distances = np.diff(np.array(self.edges)[list(self.knots)])
-        reach = np.full((2, len(self.moving)), REACH)
-        reach[0, :1], reach[1, -1:] = FAR, FAR
+        """Bounds (m, 2) of the moving edges' places: two neighbours never meet; beside an end there is more room."""
+        distances = np.diff(np.array(self.edges)[list(self._ends_of_arcs)])
+        reach = np.full((2, len(self.moving)), 0.45)
+        reach[0, :1], reach[1, -1:] = 0.9, 0.9
         places = np.array(self.edges)[list(self.moving)]
         return np.stack([places - reach[0] * distances[:-1], places + reach[1] * distances[1:]], axis=-1)
 
     @property
     def shares(self) -> np.ndarray:
         """Derivatives (N + 1, m) of the places of all edges by those of the moving ones."""
-        knots = np.array(self.edges)[list(self.knots)]
+        knots = np.array(self.edges)[list(self._ends_of_arcs)]
         return np.array([np.interp(self.edges, knots, one) for one in np.eye(len(knots))[1:-1]]).reshape(-1, len(self.edges)).T
 
     def moved(self, places: np.ndarray) -> PhaseMesh:
@@ -136,14 +125,14 @@ class PhaseMesh:
         return PhaseMesh(tuple(edges), order, control_order, tuple(j.tolist()), self.constant)
 
     def found_in(self, edges: np.ndarray) -> PhaseMesh:
-        """This mesh as it lies in a trajectory of it, from the ends (N + 1,) of the trajectory's elements, in time: with its moving edges
-        where they are there. The mesh as it is, if the trajectory is of another one."""
+        """This mesh with its moving edges where a trajectory has them, whose elements end at `edges` (N + 1,); else as it is."""
         if len(edges) != len(self.edges) or not self.moving or not edges[-1] > edges[0]:
             return self
         places = (edges - edges[0]) / (edges[-1] - edges[0])
         low, high = self.ranges().T
         mesh = self.moved(np.clip(places[list(self.moving)], low, high))
-        return mesh if np.abs(places - mesh.edges).max() <= SAME else self
+        # Beyond rounding, of times far from 0 too, it is another one.
+        return mesh if np.abs(places - mesh.edges).max() <= 1e-9 else self
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data; what a mesh does not have is left out."""

@@ -14,10 +14,8 @@ from ..numerics.batched import Batched
 from .layout import Layout
 from .writer import PhaseWriter, filled
 
-SOLVED = 1e-12
+PROPAGATED = 1e-12
 """Largest scaled residual of the equations of states at which fast propagation is good enough."""
-MOST = 20_000_000
-"""Most derivatives in memory at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +28,7 @@ class Propagated:
 
 
 class Reduced(Deriving):
-    """The constraints that propagation leaves to satisfy: lower <= values <= upper.
-
-    The rows are the final states that are imposed, then all variables that are not free (states), then those constraints of the NLP that
-    propagation does not satisfy. peaks (p,), rest (r,), scores (r,), lower, upper, scale (rows,), equation (rows,), inside (rows,).
-    """
+    """lower <= values <= upper (rows,): imposed final states, variables that are not free, rows that propagation does not satisfy."""
 
     def __init__(
         self,
@@ -66,8 +60,8 @@ class Reduced(Deriving):
     def propagate(self, Z: np.ndarray) -> Propagated:
         """Propagate vectors (k, n), of which only the free entries matter."""
         propagated, values, residual, *scores = self._propagation(False)(Z)
-        if not residual.max(initial=0.0) <= SOLVED:
-            unsolved = ~(residual.max(axis=1) <= SOLVED)
+        if not residual.max(initial=0.0) <= PROPAGATED:
+            unsolved = ~(residual.max(axis=1) <= PROPAGATED)
             propagated[unsolved], values[unsolved], _, *again = self._propagation(True)(Z[unsolved])
             for found, better in zip(scores, again, strict=True):
                 found[unsolved] = better
@@ -79,7 +73,7 @@ class Reduced(Deriving):
         function, chosen = self._derivatives(interior), rows if interior else self._among_ends[rows]
         count, d = len(self.inside) if interior else int(np.sum(~self.inside)), len(self._layout.free)
         found = np.empty((len(propagated.Z), len(rows), d))
-        some = max(1, MOST // max(1, count * d))
+        some = max(1, 20_000_000 // max(1, count * d))  # derivatives in memory at once
         for first in range(0, len(found), some):
             part = propagated.Z[first : first + some]
             found[first : first + some] = function(part)[0].reshape(len(part), count, d)[:, chosen]
@@ -134,8 +128,7 @@ class Reduced(Deriving):
         return ca.Function("judged", [extended, finals], [ca.densify(value) for value in (z[:n], values, *scores)])
 
     def _total(self, *, interior: bool) -> ca.Function:
-        """Propagated z -> total derivatives of the values by the free variables, (d, rows); without `interior`, of the rows that need none
-        of it."""
+        """Propagated z -> derivatives of the values by the free variables, (d, rows); without `interior`, only of rows at the ends."""
         z = ca.MX.sym("z", len(self._layout.variables))
         extended, S, finals = self._layout.extended_symbol(z), ca.MX(self._layout.seeds()), []
         extended = filled(self._writers, extended)

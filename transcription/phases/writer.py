@@ -4,124 +4,23 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from ..numerics.periodic import wrapped
+from ..numerics.batched import expanded
 from ..trajectories.limits import paths_and_peaks
-from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
+from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, wrapped
 from .adjoint import Adjoint, Ending, PhaseMultipliers, swept
-from .guess import along, state_along
 from .layout import Layout
-from .pointwise import Pointwise
-from .state_equations import StateEquations
+from .rows import EndSlots, Rows, Written
 
 DYNAMICS = "dynamics of"
 """How labels of the equations of states begin; where an imposed final value enters, rows bear the name of that."""
-NEGLIGIBLE = 1e-8
-"""Multipliers of limits that are smaller than this part of the costates are none."""
-
-
-@dataclass(frozen=True, eq=False)
-class Ends:
-    """Slots of a phase's times, of its initial and final states (nx,), and of the parameters."""
-
-    t0: int
-    tf: int
-    initial: np.ndarray
-    final: np.ndarray
-    parameters: np.ndarray
-
-    @property
-    def statics(self) -> np.ndarray:
-        """Slots of s = [t0, tf, *parameters]."""
-        return np.array([self.t0, self.tf, *self.parameters], dtype=int)
-
-
-@dataclass
-class Rows:
-    """Rows of constraints as they come together.
-
-    `points`, where it is a list, gets what is evaluated `at_points`; by default that is no more than a call.
-    """
-
-    points: list[Pointwise] | None = None
-    expressions: list[ca.MX] = field(default_factory=list)
-    lower: list[np.ndarray] = field(default_factory=list)
-    upper: list[np.ndarray] = field(default_factory=list)
-    scale: list[np.ndarray] = field(default_factory=list)
-    labels: list[str] = field(default_factory=list)
-    propagated: list[bool] = field(default_factory=list)
-    dynamics: dict[str, slice] = field(default_factory=dict)
-    """Where the rows of dynamics of each phase are."""
-    samples: dict[tuple[str, str], list[slice]] = field(default_factory=dict)
-    """Where the rows of each of its path constraints ("path"), peaks ("peak") and bounded hidden states ("state") are, by its name and
-    that word."""
-
-    def add(
-        self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, propagated: bool = False
-    ) -> None:
-        """A matrix of rows, taken column by column; limits, scale and label one for each or one for all.
-
-        `propagated` rows are satisfied by propagation, where no final value is imposed.
-        """
-        count = expression.numel()
-        self.expressions.append(ca.vec(expression))
-        for target, value in ((self.lower, lower), (self.upper, upper), (self.scale, scale)):
-            target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
-        self.propagated.append(propagated)
-        self.labels.extend([labels] * count if isinstance(labels, str) else labels)
-
-    def add_samples(
-        self, phase: str, kind: str, expression: ca.MX, lower: object, upper: object, scale: object, label: str, *, propagated: bool = False
-    ) -> None:
-        """Rows that are samples of one quantity of a phase, so that their multipliers are found again; see `add` and `samples`."""
-        self.samples.setdefault((phase, kind), []).append(slice(self.count, self.count + expression.numel()))
-        self.add(expression, lower, upper, scale, label, propagated=propagated)
-
-    def at_points(self, function: ca.Function, *inputs: ca.MX) -> list[ca.MX]:
-        """The outputs of a Function of columns at k points, side by side: matrices (size of the output, k) of inputs (size, k)."""
-        sizes = [function.numel_out(i) for i in range(function.n_out())]
-        if not sum(sizes):
-            return [ca.MX(0, inputs[0].shape[1])] * len(sizes)
-        point = Pointwise.of(function, inputs)
-        if self.points is not None:
-            self.points.append(point)
-        values = point.evaluated if self.points is None else point.values
-        return ca.vertsplit(values, np.cumsum([0, *sizes]).tolist())
-
-    @property
-    def count(self) -> int:
-        """Number of rows."""
-        return len(self.labels)
-
-    @property
-    def propagated_equations(self) -> ca.MX:
-        """Scaled residuals (count, 1) of the equations that propagation satisfies."""
-        chosen = [i for i, propagated in enumerate(self.propagated) if propagated and (self.lower[i] == self.upper[i]).all()]
-        return ca.vertcat(ca.MX(0, 1), *(self.expressions[i] / self.scale[i] for i in chosen))
-
-    @property
-    def left(self) -> np.ndarray:
-        """Indices of the rows that propagation does not satisfy."""
-        return np.flatnonzero(np.repeat(~np.array(self.propagated, dtype=bool), [e.numel() for e in self.expressions]))
-
-
-@dataclass(frozen=True, eq=False)
-class Written:
-    """Quantities of a phase for objectives and constraints: controls (nu,) at both ends, integrals (column), samples of peaks (peaks, k);
-    and the least values of the variables at `PhaseWriter.magnitudes` (column)."""
-
-    first_control: ca.MX
-    last_control: ca.MX
-    integrals: ca.MX
-    peak_samples: ca.MX
-    magnitudes: ca.MX = field(default_factory=lambda: ca.MX(0, 1))
 
 
 class PhaseWriter(ABC):
@@ -142,20 +41,16 @@ class PhaseWriter(ABC):
     # variables, too; steps of periodic controls count as constant. Then derivatives are put together from those at the points.
     affine: bool = False
 
-    def __init__(self, phase: CompiledPhase, layout: Layout, ends: Ends) -> None:
+    def __init__(self, phase: CompiledPhase, layout: Layout, ends: EndSlots) -> None:
         self.phase, self.layout, self.ends = phase, layout, ends
 
     @abstractmethod
     def write(self, extended: ca.MX, rows: Rows) -> Written:
-        """Add the rows of dynamics and path constraints of an extended symbol, hidden quantities and all.
-
-        `add_dynamics` and `add_paths` do so with the labels and scales that all methods share.
-        """
+        """Add the rows of an extended symbol, hidden quantities and all, best by `add_dynamics` and `add_paths`."""
 
     @abstractmethod
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Slots (k, nx) of the states that the rows of dynamics determine, the final ones among them, and where they lie (k,): 0 at t0, 1
-        at tf."""
+        """Slots (k, nx) of the states that the dynamics determine, final ones included, and their places (k,) in [0, 1]."""
 
     @abstractmethod
     def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -170,8 +65,7 @@ class PhaseWriter(ABC):
         return self.state_nodes()[1]
 
     def costates(self, extended: np.ndarray, multipliers: np.ndarray) -> PiecewisePolynomial | None:
-        """The costates of the phase on the elements of one extended vector, from the multipliers (k,) of its rows of dynamics; by default
-        None: what these say between their places is not known."""
+        """The costates on the elements of one extended vector from the multipliers (k,) of its dynamics; None: not known."""
         return None
 
     def swept(self, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
@@ -198,15 +92,14 @@ class PhaseWriter(ABC):
         return swept(self.phase, self.unpack(extended), s, multipliers.integrals, ending)
 
     def limited(self, multipliers: PhaseMultipliers) -> bool:
-        """Whether limits that make costates jump have a multiplier before tf that counts for something beside costates, both in the scales
-        of what they belong to: limits of states, path constraints on states alone, and peaks."""
+        """Whether a limit that makes costates jump has a multiplier before tf that counts beside costates, both in scales."""
         phase, slots = self.phase, self.state_nodes()[0]
         scales = np.array([v.scale for v in phase.states])
         between = (slots >= 0) & (slots != self.ends.final)
         of_states = np.where(between, multipliers.variables[np.where(between, slots, 0)], 0.0) * scales
         jumping = zip(phase.paths, multipliers.paths, self._mixed, strict=True)
         of_paths = [limit.scale * one for limit, one, mixed in jumping if not mixed]
-        least = NEGLIGIBLE * np.abs(multipliers.dynamics.reshape(-1, len(scales)) * scales).max(initial=0.0)
+        least = 1e-8 * np.abs(multipliers.dynamics.reshape(-1, len(scales)) * scales).max(initial=0.0)
         return any(np.abs(one).max(initial=0.0) > least for one in (of_states, *of_paths, *multipliers.peaks))
 
     @cached_property
@@ -223,8 +116,7 @@ class PhaseWriter(ABC):
 
     @cached_property
     def _by_states(self) -> ca.Function:
-        """(extended vector, multipliers of dynamics, path constraints on states alone, others, peaks and integrals) -> derivatives by the
-        extended vector of the Lagrangian's terms of dynamics and integrals, of those that make costates jump, and of the others."""
+        """(extended vector, multipliers) -> its derivatives of the Lagrangian: dynamics and integrals, jumping terms, others."""
         extended, rows = ca.MX.sym("extended", self.layout.total), Rows()
         written = self.write(filled([self], extended), rows)
         g, name = ca.vertcat(*rows.expressions), self.phase.name
@@ -236,8 +128,7 @@ class PhaseWriter(ABC):
         return ca.Function("by_states", [extended, *symbols], outputs)
 
     def hidden(self, extended: ca.MX) -> tuple[np.ndarray, ca.MX]:
-        """Slots (k,) of the phase's hidden quantities, and these as a column (k, 1): they follow from the variables. Most methods have
-        none."""
+        """Slots (k,) of the hidden quantities, and these as a column (k, 1): they follow from the variables."""
         return np.empty(0, dtype=int), ca.MX(0, 1)
 
     def guess(self, extended: np.ndarray) -> None:
@@ -261,10 +152,7 @@ class PhaseWriter(ABC):
         return found
 
     def interpolate(self, extended: np.ndarray, trajectory: PhaseTrajectory) -> None:
-        """Fill in the states between the ends, and the controls, of one extended vector (1, ...) from a trajectory of the phase.
-
-        By default their values at the nodes. Bounds are seen to afterwards.
-        """
+        """Fill in inner states and controls of one extended vector (1, ...): by default a trajectory's values at the nodes."""
         length = trajectory.tf - trajectory.t0
         slots, share = self.control_nodes()
         controls = trajectory.control(trajectory.t0 + length * share)
@@ -278,8 +166,7 @@ class PhaseWriter(ABC):
         return self._equations.propagate(extended, self.ends.initial)
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
-        """Derivatives of the states of an extended symbol, which are propagated, by the free variables. By default those of the implicit
-        function that the rows of dynamics define."""
+        """Derivatives of propagated states by the free variables; by default of the implicit function of the dynamics."""
         return self._equations.sensitivity(extended, S)
 
     @cached_property
@@ -290,10 +177,7 @@ class PhaseWriter(ABC):
         return StateEquations(self.phase, self.layout, extended, rows.propagated_equations, self.state_nodes()[0], self.ends.final)
 
     def add_dynamics(self, rows: Rows, residual: ca.MX) -> None:
-        """Add rows residual = 0 of a matrix (nx, k) in the order of time, which propagation satisfies.
-
-        An imposed final value enters the last column, whose rows therefore bear its name.
-        """
+        """Add rows residual (nx, k) = 0 in the order of time; those of the last column bear the name of an imposed end."""
         states, k = self.phase.states, residual.shape[1]
         names = [f"{DYNAMICS} {self.phase.name}.{v.name}" for v in states]
         last = [
@@ -340,8 +224,94 @@ class PhaseWriter(ABC):
 
 
 def filled(writers: Sequence[PhaseWriter], extended: ca.MX) -> ca.MX:
-    """An extended symbol with the hidden quantities of these phases, of all at once: a copy of the whole vector for each phase would cost
-    the square of their number."""
+    """An extended symbol with the hidden quantities of all these phases, in one copy of the whole vector."""
     hidden = [writer.hidden(extended) for writer in writers]
     slots = np.concatenate([own for own, _ in hidden])
     return writers[0].layout.replaced(extended, slots, ca.vertcat(*(values for _, values in hidden))) if len(slots) else extended
+
+
+class StateEquations:
+    """G(y, e) = 0 for the scaled states y of one phase, where e is the rest of an extended vector. slots (k, nx), final (nx,)."""
+
+    def __init__(
+        self, phase: CompiledPhase, layout: Layout, extended: ca.MX, residual: ca.MX, slots: np.ndarray, final: np.ndarray
+    ) -> None:
+        if residual.numel() != slots.size:
+            raise ValueError(f"phase '{phase.name}': {residual.numel()} rows of dynamics do not determine {slots.size} states")
+        self._layout, self._slots, self._final = layout, slots.ravel(), final
+        self._scales = ca.DM(np.tile([v.scale for v in phase.states], len(slots)))
+        self._initial = np.tile(np.arange(len(phase.states)), len(slots))
+        y = ca.MX.sym("y", slots.size)
+        rows = ca.Function("rows", [extended], [residual])(layout.replaced(extended, self._slots, y * self._scales, constants=True))
+        self._residual = expanded(ca.Function("equations", [y, extended], [ca.densify(rows)], ["x", "p"], ["g"]))
+        options = {"error_on_fail": False, "max_iter": 100, "abstol": 1e-14, "abstolStep": 1e-14}
+        self._newton = ca.rootfinder("newton", "fast_newton", self._residual, options)
+        x, p = self._residual.mx_in()
+        g = self._residual(x, p)
+        self._jacobians = expanded(ca.Function("jacobians", [x, p], [ca.jacobian(g, x), ca.jacobian(g, p)]))
+        index = layout.index(self._slots)
+        self._rows_of_final = [int(np.flatnonzero(index == i)[0]) for i in layout.index(final)]
+
+    def propagate(self, extended: ca.MX, initial: np.ndarray) -> tuple[ca.MX, ca.MX, ca.MX]:
+        """`initial` (nx,) are the slots of the initial states, from which all others begin."""
+        y = self._newton(extended[self._layout.index(initial)[self._initial].tolist()] / self._scales, extended)
+        x = y * self._scales
+        return self._layout.replaced(extended, self._slots, x), x[self._rows_of_final], self._residual(y, extended)
+
+    def sensitivity(self, extended: ca.MX, S: ca.MX) -> tuple[ca.MX, ca.MX]:
+        y = extended[self._layout.index(self._slots).tolist()] / self._scales
+        if (self._final < 0).any():
+            # An extended vector has the imposed values, not those that propagation gives.
+            y = self._newton(y, extended)
+        by_states, by_rest = self._jacobians(y, extended)
+        of_states = ca.solve(by_states, -(by_rest @ S), "qr") * ca.repmat(self._scales, 1, S.shape[1])
+        return self._layout.replaced(S, self._slots, of_states), of_states[self._rows_of_final, :]
+
+
+def line(start: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Straight lines from `start` (k,) to `end` (k,) at `share` (...) of the way; shape (k, ...)."""
+    shape = (-1,) + (1,) * share.ndim
+    return start.reshape(shape) + (end - start).reshape(shape) * share
+
+
+def along(given: Any, t0: np.ndarray, tf: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """A user's guess where it is needed. given (times, values), t0, tf (k,), share (...) -> (k, ...)."""
+    first, second = given if np.ndim(given) else (given, given)
+    if np.ndim(first):
+        return np.interp(line(t0, tf, share), first, second)
+    return line(np.full(len(t0), float(first)), np.full(len(t0), float(second)), share)
+
+
+def state_along(phase: CompiledPhase, i: int, start: np.ndarray, t0: np.ndarray, tf: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Values (k, ...) of state i, as guessed, or on lines from `start` (k,) to the middle of its final range; `share` as in `along`."""
+    state, final = phase.states[i], phase.final[i]
+    if state.name in phase.guesses:
+        return along(phase.guesses[state.name], t0, tf, share)
+    return line(start, start if final == (state.lower, state.upper) else np.full(len(start), 0.5 * sum(final)), share)
+
+
+def unwrapped_law(U: ca.MX, phase: CompiledPhase) -> ca.MX:
+    """Coefficients (nu, q + 1) of which those of periodic controls follow each other the short way round: see `trajectory.unwrapped`."""
+    period, divisor, _ = _periods(phase)
+    if not period.any():
+        return U
+    law = ca.horzsplit(U)
+    for k in range(1, len(law)):
+        step = law[k] - law[k - 1]
+        law[k] = law[k - 1] + step - period * ca.floor(step / divisor + 0.5)
+    return ca.horzcat(*law)
+
+
+def wrapped_controls(controls: ca.MX, phase: CompiledPhase) -> ca.MX:
+    """Controls (nu, k) of which the periodic ones are brought back into their bounds: see `trajectory.wrapped`."""
+    period, divisor, lower = _periods(phase)
+    if not period.any():
+        return controls
+    turns = [ca.floor((column - lower) / divisor) for column in ca.horzsplit(controls)]
+    return controls - ca.repmat(ca.DM(period), 1, controls.shape[1]) * ca.horzcat(*turns)
+
+
+def _periods(phase: CompiledPhase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Periods of the controls (nu,), 0 where there is none; the same to divide by; lower bounds."""
+    period = np.array([v.period or 0.0 for v in phase.controls])
+    return period, np.where(period > 0, period, 1.0), np.array([v.lower for v in phase.controls])

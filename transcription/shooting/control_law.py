@@ -10,15 +10,10 @@ from scipy.sparse import csc_matrix
 
 from problems.compiled import CompiledPhase
 
-from ..numerics.periodic import unwrapped_law
 from ..numerics.polynomials import lobatto_nodes
 from ..phases.mesh import PhaseMesh
+from ..phases.writer import unwrapped_law
 
-FORGOTTEN = 1e-17
-"""Weights of a spline by its values, where the largest are 1, that count as 0: they fall by a factor of 3.7 a node."""
-PIECES, NEAR = 512, 48
-"""Pieces of a spline whose weights are found at a time, and nodes on both sides that have a part in them: over so many, also of pieces
-that grow by a tenth each, they fall below 1e-20."""
 DEGREES = {"constant": 0, "linear": 1, "spline": 3}
 
 
@@ -60,10 +55,7 @@ class ControlLaw:
         return 0.5 * (self.edges[1:] + self.edges[:-1]) if self.jumps else self.edges
 
     def coefficients(self, U: ca.MX, steps: np.ndarray, phase: CompiledPhase) -> ca.MX:
-        """The polynomials on each step: their values at its Gauss-Lobatto nodes ("lobatto" in `polynomials.basis_matrix`).
-
-        Periodic controls follow each other the short way round, beyond their bounds where need be. steps (N + 1,).
-        """
+        """Values at the Gauss-Lobatto nodes of each step; periodic controls go the short way round. steps (N + 1,)."""
         if self.kind == "linear":
             values = ca.horzcat(U[:, :-1], U[:, 1:])
             if any(v.period for v in phase.controls):
@@ -95,18 +87,19 @@ class ControlLaw:
 def _spline_weights(nodes: np.ndarray, piece: np.ndarray, place: np.ndarray) -> csc_matrix:
     """Sparse matrix (nodes, k) of the values of a spline by those at its nodes, in these pieces and at these places in them, (k,).
 
-    Some pieces at a time, by the spline through the nodes near them: what a node farther away has a part in is less than `FORGOTTEN`.
+    Some pieces at a time, by the spline through the nodes near them. Weights fall by a factor of 3.7 a node: over 48 nodes, also of pieces
+    that grow by a tenth each, below 1e-20. What is less than 1e-17 counts as 0.
     """
     from scipy.interpolate import CubicSpline  # slow to import
 
-    last, found = len(nodes) - 1, []
-    for first in np.unique(piece // PIECES) * PIECES:
-        column = np.flatnonzero((piece >= first) & (piece < first + PIECES))
-        low, high = max(first - NEAR, 0), min(first + PIECES + NEAR, last) + 1
+    last, pieces, near, found = len(nodes) - 1, 512, 48, []
+    for first in np.unique(piece // pieces) * pieces:
+        column = np.flatnonzero((piece >= first) & (piece < first + pieces))
+        low, high = max(first - near, 0), min(first + pieces + near, last) + 1
         spline = CubicSpline(nodes[low:high], np.eye(high - low))
         own = piece[column]
         weights = spline(nodes[own] + place[column] * np.diff(nodes)[own])
-        row, node = np.nonzero(np.abs(weights) >= FORGOTTEN)
+        row, node = np.nonzero(np.abs(weights) >= 1e-17)
         found.append((weights[row, node], low + node, column[row]))
     weights, node, column = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return _without_zeros(weights, node, column, (len(nodes), len(piece)))

@@ -20,17 +20,33 @@ from problems.problem import Problem
 from ..assembly import Assembly
 from ..base import NLP, Transcription
 from ..meshed import Meshed
-from ..meshes.density import LEAST
+from ..meshes.refinement import DENSITY_FLOORS, equidistributed, integrals, raised, trajectory_density
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
-from ..phases.writer import Ends
-from ..trajectories.trajectory import Trajectory
+from ..phases.rows import EndSlots
+from ..trajectories.trajectory import PhaseTrajectory, Trajectory
 from .control_law import DEGREES, ControlLaw
 from .phase import ShootingPhase
-from .remeshing import next_intervals
-from .runge_kutta import TABLEAUX
-from .stability import check_steps
-from .step import Step, StepMesh
+from .runge_kutta import TABLEAUX, check_steps
+from .step import RungeKuttaStep, StepMesh
+
+
+def next_intervals(
+    old: PhaseMesh, phase: PhaseTrajectory, errors: np.ndarray, of_controls: np.ndarray, degree: int, least: float, most: int
+) -> PhaseMesh:
+    """The next mesh of a phase, by its density: more intervals where errors (N,) ask for it, or where nothing is wrong."""
+    places, values = trajectory_density(phase)
+    right = max(errors.max(initial=0.0), of_controls.max(initial=0.0)) <= 1.0
+    count = min(max(most, old.elements), int(np.ceil(1.5 * old.elements))) if right else old.elements
+    curved = count * raised(places, values, least)
+    # Errors of a step fall with the order and one more, those of controls of this degree twice as fast as their last coefficient.
+    shorter = np.maximum(errors ** (1.0 / (old.order + 1)), of_controls ** (0.5 / max(degree, 1)))
+    # A step that is too long becomes somewhat shorter than that, but no more than four times: its error says little about finer meshes.
+    shorter = np.minimum(np.nan_to_num(np.where(shorter > 1.0, 1.25 * shorter, shorter), nan=4.0), 4.0)
+    needed = shorter / np.diff(places)
+    density = np.maximum(curved, (needed * old.elements / (len(places) - 1))[:, None])
+    count = max(count, min(most, int(np.ceil(integrals(places, density)[-1] - 1e-9))))
+    return PhaseMesh(tuple(equidistributed(places, density, count).tolist()), old.order)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +104,7 @@ class Shooting(Transcription):
 
     @classmethod
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
-        """See `Transcription.from_word`: options are, in any order, a kind of control, its number of nodes, and a scheme."""
+        """Options are, in any order, a kind of control, its number of nodes, and a scheme."""
         if not 1 <= len(numbers) <= 2:
             raise ValueError(f"write it as {cls.examples}")
         settings: dict[str, Any] = dict(zip((cls._counted[0], "steps"), numbers, strict=False))
@@ -101,7 +117,6 @@ class Shooting(Transcription):
         return cls(**settings)
 
     def to_word(self) -> str:
-        """See `Transcription.to_word`."""
         steps = f"x{self.steps}" if self.steps > 1 else ""
         defaults = (self.control, "constant"), (self.control_nodes, None), (self.scheme, "rk4")
         return ":".join([super().to_word() + steps, *(str(value) for value, default in defaults if value != default)])
@@ -111,12 +126,12 @@ class Shooting(Transcription):
         compiled = problem.compile()
         self._check_steps(compiled)
 
-        def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> ShootingPhase:
+        def writer(phase: CompiledPhase, layout: Layout, ends: EndSlots) -> ShootingPhase:
             mesh, points = self._phase_mesh(phase.name), [i / (self.path_points + 1) for i in range(self.path_points + 1)]
             law = self._law(mesh)
             if law.jumps and _sees_controls(phase):
                 points.append(1.0)
-            step = Step(TABLEAUX[self.scheme], law.degree, points, phase)
+            step = RungeKuttaStep(TABLEAUX[self.scheme], law.degree, points, phase)
             return ShootingPhase(self._steps(mesh), law, step, phase, layout, ends, apart=self._apart)
 
         return Assembly(compiled, writer).nlp(self)
@@ -242,24 +257,22 @@ class MultipleShooting(Meshed, Shooting):
         return TABLEAUX[self.scheme].order
 
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
-        """See `Shooting.transcribe`."""
         compiled = problem.compile()
         self.check_phases(compiled)
         return super().transcribe(compiled)
 
     def remeshed(self, meshes: Mapping[str, PhaseMesh], *, bounded: bool = False) -> MultipleShooting:
-        """See `Meshed.remeshed`: straight lines between values within bounds stay within these."""
+        """Straight lines between values within bounds stay within these."""
         other = super().remeshed(meshes)
         return replace(other, control="linear") if bounded and self.control == "spline" else other
 
     def adapted(
         self, problem: CompiledProblem, trajectory: Trajectory, errors: Mapping[str, np.ndarray], of_controls: Mapping[str, np.ndarray]
     ) -> MultipleShooting:
-        """See `Meshed.adapted`: intervals by the density of the trajectory; see `remeshing`. Where their steps would be too long to be
-        stable, they are more even."""
+        """Intervals by the density of the trajectory, more even where their steps would be too long to be stable."""
         degree, most = DEGREES[self.control], max(self.most_elements, 2 * self.elements)
         found = self
-        for least in LEAST:
+        for least in DENSITY_FLOORS:
             found = self.remeshed(
                 {
                     name: next_intervals(self.mesh_of(name), phase, errors[name], of_controls[name], degree, least, most)
@@ -272,7 +285,7 @@ class MultipleShooting(Meshed, Shooting):
         return found
 
     def suits(self, problem: CompiledProblem) -> bool:
-        """See `Meshed.suits`: whether all steps may be stable."""
+        """Whether all steps may be stable."""
         try:
             self._check_steps(problem)
         except ValueError:
@@ -280,7 +293,7 @@ class MultipleShooting(Meshed, Shooting):
         return True
 
     def alternatives(self) -> tuple[MultipleShooting, ...]:
-        """See `Meshed.alternatives`: as many equal intervals."""
+        """As many equal intervals."""
         equal = {name: PhaseMesh.uniform(mesh.elements, mesh.order) for name, mesh in self.meshes.items()}
         return () if equal == self.meshes else (self.remeshed(equal),)
 

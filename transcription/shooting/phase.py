@@ -1,4 +1,4 @@
-"""One phase by shooting: its variables, its rows, its propagation and its trajectory."""
+"""One phase by shooting: its variables, its rows, its propagation, its trajectory and its costates."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from ..numerics.batched import CHAIN, Batched, widened, work
 from ..numerics.polynomials import lobatto_nodes
 from ..phases.adjoint import Adjoint, PhaseMultipliers, slopes
 from ..phases.layout import Layout
-from ..phases.writer import Ends, PhaseWriter, Rows, Written
+from ..phases.rows import EndSlots, Rows, Written
+from ..phases.writer import PhaseWriter
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
-from .adjoint import Steps, backward, cubics
 from .control_law import ControlLaw
-from .step import Step, StepMesh
+from .step import RungeKuttaStep, StepMesh
 
-LONG = 3_000_000
+LONGEST_CHAIN = 3_000_000
 """Most operations of a chain of steps times variables that it depends on, for which its derivatives are written out."""
 
 
@@ -35,7 +35,7 @@ class ShootingPhase(PhaseWriter):
     """
 
     def __init__(
-        self, mesh: StepMesh, law: ControlLaw, step: Step, phase: CompiledPhase, layout: Layout, ends: Ends, *, apart: bool
+        self, mesh: StepMesh, law: ControlLaw, step: RungeKuttaStep, phase: CompiledPhase, layout: Layout, ends: EndSlots, *, apart: bool
     ) -> None:
         super().__init__(phase, layout, ends)
         self.mesh, self.law, self.step, self.apart = mesh, law, step, apart
@@ -62,12 +62,10 @@ class ShootingPhase(PhaseWriter):
         self.dense = rows * int((self.U >= 0).sum()) // (2 * len(self.R))
 
     def hidden(self, extended: ca.MX) -> tuple[np.ndarray, ca.MX]:
-        """See `PhaseWriter.hidden`."""
         states, integrals, samples = zip(*self._propagated_shots(extended), strict=True)
         return self._hidden(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples))
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
-        """See `PhaseWriter.write`."""
         phase, pick = self.phase, self.layout.pick
         self.add_dynamics(rows, pick(extended, self.R) - pick(extended, self._arrivals))
         at_nodes = pick(extended, self.Y)
@@ -81,8 +79,7 @@ class ShootingPhase(PhaseWriter):
         return Written(*ends, integrals, seen[len(phase.paths) :, :], ca.vec(ca.fabs(sizes)))
 
     def _with_sizes(self, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX]:
-        """The integrals, those of absolute values that are constant where the controls are as sums of the variables S; and what these
-        values are of, (k, values)."""
+        """The integrals, absolute values that are constant where controls are by variables S, and what these are of, (k, values)."""
         pick, phase = self.layout.pick, self.phase
         integrals, U = pick(extended, self.Q), pick(extended, self.U)
         if not self._sized:
@@ -97,15 +94,13 @@ class ShootingPhase(PhaseWriter):
         return ca.vertcat(*entries), sizes
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `PhaseWriter.state_nodes`."""
         return self._arrivals, self.mesh.places[self._shots][1:]
 
     def control_nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `PhaseWriter.control_nodes`."""
         return self.U, self.law.places
 
     def propagate(self, extended: ca.MX, *, robust: bool) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """See `PhaseWriter.propagate`. There is nothing to solve."""
+        """There is nothing to solve."""
         k, n = extended.shape[1], self.mesh.steps
         begun = self._before.map(k)(extended)
         if k == 1:
@@ -116,7 +111,6 @@ class ShootingPhase(PhaseWriter):
         return *self._after.map(k)(extended, *back), ca.MX(0, k)
 
     def sensitivity(self, extended: ca.MX, S: ca.MX, *, interior: bool) -> tuple[ca.MX, ca.MX]:
-        """See `PhaseWriter.sensitivity`."""
         nx, nq, n = len(self.phase.states), len(self.Q), self.mesh.steps
         inputs, initial = self._inputs(extended), self.layout.pick(extended, self.ends.initial)
         states = self._propagated(initial, *inputs)[0]
@@ -138,7 +132,6 @@ class ShootingPhase(PhaseWriter):
         return self.layout.replaced(S, np.concatenate([part.ravel() for part in slots]), ca.vertcat(*values)), ends[n]
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
-        """See `PhaseWriter.unpack`."""
         phase, k = self.phase, self.law.degree + 1
         C, states = (values[0] for values in self._on_steps(extended[None]))
         s = extended[self.layout.index(self.ends.statics)]
@@ -153,37 +146,39 @@ class ShootingPhase(PhaseWriter):
         return self.trajectory(extended, inside, state, control)
 
     def swept(self, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
-        """See `PhaseWriter.swept`: by the adjoint of the steps themselves, and cubic inside of each."""
+        """Costates by the adjoint of the steps themselves, exact whatever their length, and cubic inside of each."""
         phase, flown, nx, nq, n = self.phase, self.unpack(extended), len(self.phase.states), len(self.Q), self.mesh.steps
-        rows, points = self.step.rows, len(self.step.points)
+        rows, points, inside = self.step.rows, len(self.step.points), self.mesh.ends[1:-1]
         D, at_end = (np.array(one) for one in self._linearised(extended))
+        # By the states before a step: the states after it, its integrals, and samples at its points, of which the first is its beginning.
         D = D.reshape(-1, n, self.step.inputs).swapaxes(0, 1)[:, :, :nx]
-        steps = Steps(
-            D[:, :nx], D[:, nx : nx + nq], D[:, nx + nq :].reshape(n, points, rows, nx), at_end.reshape(-1, self.step.inputs)[:, :nx]
-        )
+        after, integrals, samples = D[:, :nx], D[:, nx : nx + nq], D[:, nx + nq :].reshape(n, points, rows, nx)
         seen = np.array([*multipliers.paths, *multipliers.peaks]).reshape(self.W.shape[::-1]).T
-        inside = self.mesh.ends[1:-1]
+        of_samples, of_end = seen[: n * points].reshape(n, points, rows), seen[n * points :].ravel()
         falls = np.zeros((n, nx))
         if self.apart:
             slots = self.B[1:-1]
             falls[inside] = np.where(slots >= 0, multipliers.variables[slots], 0.0)
         elif len(self.Y):
             falls[inside] = np.array(multipliers.states).T
-        of_samples, of_end = seen[: n * points].reshape(n, points, rows), seen[n * points :].ravel()
-        final = multipliers.dynamics.reshape(-1, nx)[-1]
-        begin, end = backward(steps, final, multipliers.integrals, of_samples, of_end, falls)
+        begin, end = np.empty_like(falls), np.empty_like(falls)
+        p = multipliers.dynamics.reshape(-1, nx)[-1] + of_end @ at_end.reshape(-1, self.step.inputs)[:, :nx]
+        for k in range(n - 1, -1, -1):
+            end[k] = p
+            of_inside = np.einsum("pr,prx->x", of_samples[k, 1:], samples[k, 1:])
+            begin[k] = p @ after[k] + multipliers.integrals @ integrals[k] + of_inside
+            p = begin[k] + falls[k] + of_samples[k, :1].ravel() @ samples[k, :1].reshape(-1, nx)
         s = extended[self.layout.index(self.ends.statics)]
         ends = []
         for tau, costates in ((-1.0, begin), (1.0, end)):
             x, u = (piece(np.array([tau]))[:, 0] for piece in (flown.state.on_elements, flown.controls_on_elements))
             by_x, own = slopes(phase, x, u, flown.state.times(np.array([tau]))[:, 0], s, multipliers.integrals)
             ends.append(-(np.einsum("kij,kj->ki", by_x, costates) + own))
-        return Adjoint(cubics(flown.state.edges, begin, end, *ends))
+        return Adjoint(_hermite(flown.state.edges, begin, end, *ends))
 
     @cached_property
     def _linearised(self) -> ca.Function:
-        """Extended vector -> derivatives (results, N inputs) of all steps side by side, and (rows, inputs) of samples at their end, by all
-        inputs of a step; without rows where none are sampled there."""
+        """Extended vector -> derivatives (results, N inputs) of all steps, and (rows, inputs) of samples at their end."""
         extended, n = ca.MX.sym("extended", self.layout.total), self.mesh.steps
         inputs, left = self._inputs(extended), self.layout.pick(extended, self.B[:-1])
         shots = [states for states, *_ in self._propagated_shots(extended)]
@@ -200,8 +195,7 @@ class ShootingPhase(PhaseWriter):
 
     @cached_property
     def _on_steps(self) -> Batched:
-        """Extended vectors -> coefficients (N, degree + 1, nu) of the controls and states (N, order + 1, nx) at Gauss-Lobatto nodes of the
-        steps, both flat."""
+        """Extended vectors -> coefficients of controls (N, degree + 1, nu) and states (N, order + 1, nx) on steps, both flat."""
         extended = ca.MX.sym("extended", self.layout.total)
         inputs, left = self._inputs(extended), self.layout.pick(extended, self.B[:-1])
         before = [part for j, (states, *_) in enumerate(self._propagated_shots(extended)) for part in (left[:, j], states[:, :-1])]
@@ -221,7 +215,7 @@ class ShootingPhase(PhaseWriter):
     def _chain(self, n: int) -> ca.Function:
         """(states and integrals so far, inputs of n steps) -> (these after each step, samples)."""
         chain = self.step.forward.mapaccum("steps", n) if n > 1 else self.step.forward
-        if work(chain) * min(len(self.layout.free), n * self.step.inputs) <= LONG:
+        if work(chain) * min(len(self.layout.free), n * self.step.inputs) <= LONGEST_CHAIN:
             return chain
         # Its derivatives, written out, would take too much memory.
         symbols = chain.mx_in()
@@ -287,6 +281,14 @@ class ShootingPhase(PhaseWriter):
             ca.vertcat(controls[i * each : (i + 1) * each, :], statics[0, :] + length * places[i], length * widths[i], statics)
             for i in range(n)
         ]
+
+
+def _hermite(edges: np.ndarray, begin: np.ndarray, end: np.ndarray, first: np.ndarray, last: np.ndarray) -> PiecewisePolynomial:
+    """Hermite's cubic polynomials through values (N, nx) at the beginning and the end of each step with these slopes (N, nx) in time."""
+    t, h = 0.5 * (1.0 + lobatto_nodes(4))[:, None], np.diff(edges)[:, None, None]
+    begin, end, first, last = (one[:, None, :] for one in (begin, end, first, last))
+    values = (1 + 2 * t) * (1 - t) ** 2 * begin + t**2 * (3 - 2 * t) * end + h * t * (1 - t) * ((1 - t) * first - t * last)
+    return PiecewisePolynomial(edges, values, "lobatto")
 
 
 def _sized_by_controls(phase: CompiledPhase) -> list[int]:

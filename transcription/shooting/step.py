@@ -13,13 +13,13 @@ import numpy as np
 from problems.compiled import CompiledPhase
 
 from ..numerics.batched import expanded
-from ..numerics.periodic import wrapped_controls
 from ..numerics.polynomials import basis_matrix
 from ..phases.mesh import PhaseMesh
+from ..phases.writer import wrapped_controls
 from .runge_kutta import Tableau
 
 
-class Step:
+class RungeKuttaStep:
     """A step as Functions of its inputs: the states at its beginning, the coefficients of the controls, its start and length, and s.
 
     Integrals are quadrature states of the same method. A point inside the step is reached by a step of the same method of that part of its
@@ -60,8 +60,7 @@ class Step:
         return self._function("inside", [x, *others], [ca.horzcat(*(self._reached(x, float(place), *others) for place in places))])
 
     def gradient(self, *, samples: bool) -> ca.Function:
-        """(x, C, start, h, s) -> derivatives (results, inputs) of the states and integrals after the step and, if wanted, of the samples,
-        point after point, by all inputs."""
+        """(x, C, start, h, s) -> derivatives (results, inputs) of states, integrals [and samples, point after point]."""
         x, others = self._kind.sym("x", len(self.phase.states)), self._symbols()
         after, values = self._whole(x, *others)
         results = ca.vertcat(after, ca.vec(values)) if samples else after
@@ -119,10 +118,6 @@ class Step:
         return wrapped_controls(C @ ca.sparsify(ca.DM(weights)), self.phase)
 
 
-SAME = 1e-9
-"""Places nearer to each other than this, relative to the phase, are one."""
-
-
 @dataclass(frozen=True, eq=False)
 class StepMesh:
     """The ends of steps: `places` (N + 1,), relative to the phase; `ends` (M + 1,), which of these are ends of intervals."""
@@ -135,7 +130,8 @@ class StepMesh:
         """`intervals` equal ones of `steps` equal steps each; a step across one of the nodes of controls becomes two."""
         whole = np.linspace(0.0, 1.0, intervals * steps + 1)
         right = np.clip(np.searchsorted(whole, nodes), 1, len(whole) - 1)
-        apart = np.minimum(np.abs(nodes - whole[right - 1]), np.abs(nodes - whole[right])) > SAME
+        # Places that are nearer to each other, relative to the phase, are one.
+        apart = np.minimum(np.abs(nodes - whole[right - 1]), np.abs(nodes - whole[right])) > 1e-9
         places = np.sort(np.concatenate([whole, nodes[apart]]))
         return cls(places, np.searchsorted(places, whole[::steps]))
 

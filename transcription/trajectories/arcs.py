@@ -13,24 +13,19 @@ from scipy.integrate import solve_ivp
 from problems.compiled import CompiledPhase, remembered
 
 from ..numerics.batched import expanded
-from ..numerics.periodic import wrapped
 from ..numerics.polynomials import basis_matrix, monomials
 from ..stopping import check_stopping
 from .limits import DENSE
-from .trajectory import PhaseTrajectory
+from .trajectory import PhaseTrajectory, wrapped
 
 EXPLICIT = ("RK23", "RK45", "DOP853")
 METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")
 """Those that are implicit solve for all arcs in one dense system, so that each arc is integrated alone."""
 STIFF = "Radau"
 """The method for arcs on which an explicit one has used up `MOST_CALLS`."""
-MODERATE = 12
-"""Highest degree of controls that are evaluated as sums of powers."""
 MOST_CALLS = 200_000
 """Evaluations of the dynamics on one element after which an integration by one method counts as broken down."""
-EVERY = 100
-"""Evaluations of the dynamics after which an integration asks whether to end early: some hundredths of a second."""
-GRACE = 1.0
+SIMULATION_GRACE = 1.0
 """Seconds that integrations have left when the work is asked to end: most are over by then, so that what was found is still checked."""
 
 
@@ -59,7 +54,7 @@ class Arcs:
 
     def integrate(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray:
         """States and integrals along all arcs. y (n, ny), atol (ny,) -> (n, len(DENSE)."""
-        check_stopping(GRACE)
+        check_stopping(SIMULATION_GRACE)
         found = np.full((len(y), len(DENSE), y.shape[1]), np.nan)
         self._calls[0] = 0
         able = np.flatnonzero(np.isfinite(y).all(axis=1))
@@ -112,8 +107,8 @@ class Arcs:
         n, nx, nu = len(self.begins), len(self.phase.states), len(self.phase.controls)
         function, degree = _rate_function(self.phase, n), self.coefficients.shape[1] - 1
         laws = np.ascontiguousarray(self.coefficients.swapaxes(0, 1)).reshape(degree + 1, n * nu)
-        # As sums of powers they cost a tenth of the time; the digits that this loses are few.
-        law = monomials(self.basis, degree) @ laws if degree <= MODERATE else None
+        # As sums of powers they cost a tenth of the time; up to this degree the digits that this loses are few.
+        law = monomials(self.basis, degree) @ laws if degree <= 12 else None
         exponents, line = np.arange(degree + 1), np.ones(2)
         half, half_of_each = 0.5 * self.lengths[:, None], 0.5 * self.lengths
         x, u, time = np.zeros((n, nx)), np.zeros((n, nu)), np.zeros(n)
@@ -132,8 +127,8 @@ class Arcs:
             calls[0] += 1
             if calls[0] > MOST_CALLS:
                 raise ArithmeticError("too many evaluations of the dynamics")
-            if not calls[0] % EVERY:
-                check_stopping(GRACE)
+            if not calls[0] % 100:  # some hundredths of a second
+                check_stopping(SIMULATION_GRACE)
             # Written into place: an operation of numpy on a few numbers takes longer than the dynamics.
             if n == 1:
                 flat_x[:] = y[:nx]

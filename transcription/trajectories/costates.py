@@ -1,4 +1,4 @@
-"""Costates and the Hamiltonian along a trajectory, as data."""
+"""Costates and the Hamiltonian along a trajectory, as data; and how much the Hamiltonian varies where it is constant at an optimum."""
 
 from __future__ import annotations
 
@@ -7,18 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+from problems.compiled import CompiledPhase, CompiledProblem, remembered
 
-NO_LENGTH = 1e-6
-"""Part of the whole duration that a phase lasts at most where it has no length."""
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhaseCostates(Mapping[str, np.ndarray]):
-    """The costates of one phase by state, at the nodes of its trajectory.
-
-    Where they jump they are those just after, and at tf those just before.
-    """
+    """The costates of one phase by state, at the trajectory's nodes: after a jump there, and before it at tf."""
 
     names: tuple[str, ...]  # the states
     at_nodes: np.ndarray  # (k, nx): At the nodes of the trajectory
@@ -46,8 +42,7 @@ class PhaseCostates(Mapping[str, np.ndarray]):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Costates(Mapping[str, PhaseCostates]):
-    """The costates of a whole trajectory, by phase, and the weights (m,) of the objectives, all minimised, in the sum to which they belong:
-    not negative, of sum 1 in the objectives' own units."""
+    """Costates by phase, and the weights (m,) of the minimised objectives in their sum: not negative, of sum 1 in own units."""
 
     weights: np.ndarray
     phases: Mapping[str, PhaseCostates]
@@ -68,7 +63,52 @@ class Costates(Mapping[str, PhaseCostates]):
 
 
 def has_length(trajectory: Trajectory, phase: PhaseTrajectory) -> bool:
-    """Whether a phase has a length. The multipliers of one without are no costates. If no phase has any, all count as if they had."""
+    """Whether a phase lasts for more than a millionth of the whole; all do if none does. Else multipliers are no costates."""
     lengths = [one.tf - one.t0 for one in trajectory.phases]
     whole = max(one.tf for one in trajectory.phases) - min(one.t0 for one in trajectory.phases)
-    return phase.tf - phase.t0 > NO_LENGTH * whole or max(lengths) <= NO_LENGTH * whole
+    return phase.tf - phase.t0 > 1e-6 * whole or max(lengths) <= 1e-6 * whole
+
+
+def hamiltonian_variation(problem: CompiledProblem, trajectory: Trajectory, costates: Costates) -> float:
+    """The range in which the Hamiltonian is for four fifths of the time, as a part of the mean size of its terms: the largest of all
+    autonomous phases, 0 if there is none.
+
+    The tenths of the time in which it is least and greatest do not count: there are jumps of costates at limits of states.
+
+    A phase is autonomous where neither its rates, its integrands, its path constraints nor its peaks depend on time. There the Hamiltonian
+    is constant along an optimum, also where limits act (Bryson and Ho, "Applied Optimal Control", 1975, sections 2.3 and 3.8). Its terms
+    are costates times rates, one for each state, and the weighted integrands.
+    """
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    flown = {phase.name: trajectory[phase.name] for phase in problem.phases if _is_autonomous(phase)}
+    found = [
+        _variation(phase, flown[phase.name], costates[phase.name], parameters)
+        for phase in problem.phases
+        if phase.name in flown and has_length(trajectory, flown[phase.name])
+    ]
+    return max(found, default=0.0)
+
+
+@remembered
+def _is_autonomous(phase: CompiledPhase) -> bool:
+    """Whether nothing that holds all along a phase depends on time itself."""
+    functions = (phase.dynamics, phase.integrands, phase.path, phase.peaks)
+    return not any(function.jac_sparsity(0, function.index_in("t")).nnz() for function in functions if function.size1_out(0))
+
+
+def _variation(phase: CompiledPhase, flown: PhaseTrajectory, costates: PhaseCostates, parameters: np.ndarray) -> float:
+    s = np.array([flown.t0, flown.tf, *parameters])
+    rates = np.array(phase.dynamics(flown.states.T, flown.controls.T, flown.time[None], s)).T
+    terms, H = costates.at_nodes * rates.reshape(costates.at_nodes.shape), costates.hamiltonian
+    sizes = np.abs(terms).sum(axis=1) + np.abs(H - terms.sum(axis=1))
+    spans = np.gradient(flown.time)
+    # Not the median: after a peak that is all that counts, costates vanish.
+    size, (low, high) = np.average(sizes, weights=spans), _quantiles(H, spans, [0.1, 0.9])
+    return float((high - low) / size) if size > 0 else 0.0
+
+
+def _quantiles(values: np.ndarray, spans: np.ndarray, parts: list[float]) -> np.ndarray:
+    """The values (k,) below which the others are for such parts of the time, from values (n,) that last for `spans` (n,)."""
+    order = np.argsort(values)
+    middles = np.cumsum(spans[order]) - 0.5 * spans[order]
+    return np.interp(np.multiply(parts, spans.sum()), middles, values[order])

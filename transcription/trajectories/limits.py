@@ -10,16 +10,13 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered
 
 from ..numerics.batched import Batched, expanded
-from ..numerics.periodic import wrapped
 from ..numerics.polynomials import lobatto_nodes
-from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory, wrapped
 
 DENSE = lobatto_nodes(33)
 """Places where an element is sampled, on [-1, 1]."""
-NEGLIGIBLE = 1e-6
+NEGLIGIBLE_EXCESS = 1e-6
 """Excursions up to this, in scales, are those of a feasible point's tolerance."""
-CLOSER, ROUNDS = 17, 3
-"""Places at which two gaps between samples are sampled closer, and how often, each time about the largest value of the last."""
 
 
 def excess(values: np.ndarray, limits: Sequence[Variable | Limit]) -> np.ndarray:
@@ -55,25 +52,24 @@ def largest_on_elements(
     largest = values.max(axis=1)
     # Below this nothing is looked for.
     ranges = np.ptp(peaks, axis=(0, 1)) if peaks.size else np.zeros(0)
-    floor = np.concatenate([np.zeros(count), largest[:, count:].max(axis=0)]) + NEGLIGIBLE * np.concatenate([np.ones(count), ranges])
+    floor = np.concatenate([np.zeros(count), largest[:, count:].max(axis=0)]) + NEGLIGIBLE_EXCESS * np.concatenate([np.ones(count), ranges])
     element, place, column = _promising(values, floor)
     left, right = DENSE[np.maximum(place - 1, 0)], DENSE[np.minimum(place + 1, len(DENSE) - 1)]
-    each = np.arange(len(element))
-    for _ in range(ROUNDS if len(element) else 0):
-        tau = np.linspace(left, right, CLOSER, axis=1)
+    each, count_closer = np.arange(len(element)), 17
+    for _ in range(3 if len(element) else 0):  # each time about the largest value of the last
+        tau = np.linspace(left, right, count_closer, axis=1)
         x, u = state.on(element, tau), wrapped(trajectory.control.on(element, tau), trajectory.control_variables)
         times = state.edges[element, None] + 0.5 * (1.0 + tau) * np.diff(state.edges)[element, None]
         found = paths_and_peaks(phase, x.reshape(tau.size, -1), u.reshape(tau.size, -1), times.ravel(), s)
         closer = np.hstack([_beyond(found[0], phase.paths), found[1]]).reshape(*tau.shape, -1)[each, :, column]
         best = closer.argmax(axis=1)
         np.maximum.at(largest, (element, column), closer[each, best])
-        left, right = tau[each, np.maximum(best - 1, 0)], tau[each, np.minimum(best + 1, CLOSER - 1)]
+        left, right = tau[each, np.maximum(best - 1, 0)], tau[each, np.minimum(best + 1, count_closer - 1)]
     return np.maximum(largest[:, :count], 0.0), largest[:, count:]
 
 
 def _promising(values: np.ndarray, floor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Elements, places and columns of those of `values` (N, n, q) at `DENSE` that are not less than both neighbours, and beside which there
-    may be a value above `floor` (q,), as steep as the values rise within two gaps."""
+    """Elements, places, columns of local maxima of `values` (N, n, q) beside which, by their slopes, one above `floor` (q,) may be."""
     edge = np.full_like(values[:, :1], -np.inf)
     before, after = np.concatenate([edge, values[:, :-1]], axis=1), np.concatenate([values[:, 1:], edge], axis=1)
     gaps = np.diff(DENSE)
@@ -98,16 +94,13 @@ def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, fl
     parameters = np.array(list(trajectory.parameters.values()))
     for phase in problem.phases:
         for name, amounts in excess_by_element(phase, trajectory[phase.name], parameters).items():
-            if amounts.max() > NEGLIGIBLE:
+            if amounts.max() > NEGLIGIBLE_EXCESS:
                 found[f"{phase.name}.{name}"] = float(amounts.max())
     return found
 
 
 def excess_by_element(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> dict[str, np.ndarray]:
-    """Excursions of each state, control and path constraint on each element, by name, in its scale: arrays (N,).
-
-    Controls that are periodic never do, and are left out.
-    """
+    """Excursions (N,) of each state, control that is not periodic, and path constraint on each element, in scales."""
     times = trajectory.state.times(DENSE)
     states, controls = trajectory.state.on_elements(DENSE), trajectory.controls_on_elements(DENSE)
     x, u = (values.reshape(times.size, values.shape[2]) for values in (states, controls))

@@ -71,10 +71,7 @@ class Simulation:
 def simulate(
     problem: CompiledProblem, trajectory: Trajectory, *, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853"
 ) -> Simulation:
-    """The simulation of a trajectory's controls, phase after phase, by an integrator of scipy.
-
-    Each phase starts where the phases linked to it ended in this simulation; what is not linked starts where the trajectory does.
-    """
+    """The simulation of a trajectory's controls by an integrator of scipy; a linked phase starts where the one before it ended."""
     return simulate_all(problem, [trajectory], rtol=rtol, atol=atol, method=method)[0]
 
 
@@ -169,8 +166,7 @@ def _simulation(
 
 @dataclass(frozen=True, eq=False)
 class _SimulatedPhase:
-    """One phase: the planned and the simulated trajectory, the quantities q for objectives and constraints, the excess of its paths and
-    that of its controls."""
+    """One phase as planned and as simulated, its quantities q, and the excess of its paths and controls."""
 
     planned: PhaseTrajectory
     trajectory: PhaseTrajectory
@@ -197,8 +193,7 @@ def _ends(phase: CompiledPhase) -> list[Variable]:
 
 
 def _labelled(phase: CompiledPhase) -> list[tuple[str, Variable | Limit]]:
-    """What is limited in a phase, by its label: bounds of states and of controls, paths, and final values; the label is empty for a control
-    that is periodic, which has no bounds, and for a final value with the bounds of its state."""
+    """What is limited in a phase, by label; empty for periodic controls and final values with the bounds of their state."""
     return [
         *((f"bounds of {phase.name}.{v.name}", v) for v in phase.states),
         *(("" if v.period else f"bounds of {phase.name}.{v.name}", v) for v in phase.controls),
@@ -269,14 +264,7 @@ def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: n
     beyond, highest = largest_on_elements(phase, state, planned, s, *on_elements)
     # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
     kept = np.append(np.arange(len(times) - 1) % len(DENSE) != len(DENSE) - 1, True)
-    trajectory = replace(
-        planned,
-        time=times[kept],
-        states=states[kept],
-        controls=controls[kept],
-        paths=paths[kept],
-        state=state,
-    )
+    trajectory = replace(planned, time=times[kept], states=states[kept], controls=controls[kept], paths=paths[kept], state=state)
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
     quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], highest.max(axis=0)])

@@ -4,13 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from html import escape
+from typing import Any
 
 import numpy as np
 
 from problems.compiled import Limit, Variable
 
-from ..numerics.periodic import wrapped
 from ..numerics.polynomials import basis_matrix
+
+
+def wrapped(controls: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
+    """Controls (..., nu) of which the periodic ones are brought back into their bounds."""
+    result = np.array(controls, dtype=float)
+    for i, v in enumerate(variables):
+        if v.period:
+            result[..., i] = v.lower + np.mod(result[..., i] - v.lower, v.period)
+    return result
+
+
+def unwrapped(coefficients: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
+    """Coefficients (N, degree + 1, nu), periodic ones the short way round in an element; half a period goes down."""
+    result = np.array(coefficients, dtype=float)
+    for i, v in enumerate(variables):
+        for k in range(1, result.shape[1] if v.period else 0):
+            step = result[:, k, i] - result[:, k - 1, i]
+            result[:, k, i] -= v.period * np.floor(step / v.period + 0.5)
+    return result
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -207,7 +227,6 @@ class Trajectory(Mapping[str, PhaseTrajectory]):
 
     def _repr_html_(self) -> str:
         """For notebooks: a table for each phase, with a small line of each quantity over time."""
-        from .html import trajectory_html
 
         return trajectory_html(self)
 
@@ -222,3 +241,48 @@ class Trajectory(Mapping[str, PhaseTrajectory]):
 
     def __len__(self) -> int:
         return len(self.phases)
+
+
+def trajectory_html(trajectory: Any) -> str:
+    """HTML of a `Trajectory`: a table for each phase, with a row and a small line over time for each quantity. Names are escaped."""
+    parts = [_phase(phase) for phase in trajectory.phases]
+    if trajectory.parameters:
+        values = ", ".join(f"{escape(name)} {value:.6g}" for name, value in trajectory.parameters.items())
+        parts.append(f"<div>parameters: {values}</div>")
+    return f"<div>{''.join(parts)}</div>"
+
+
+def _phase(phase: Any) -> str:
+    """A title and a table of one `PhaseTrajectory`, at its nodes."""
+    units = [v.unit for v in (*phase.state_variables, *phase.control_variables, *phase.path_limits)]
+    kinds = [*(["state"] * phase.states.shape[1]), *(["control"] * phase.controls.shape[1]), *(["path"] * phase.paths.shape[1])]
+    heads = ("", "kind", "unit", "first", "last", "least", "most", "over time")
+    rows = [_cells(heads, "th")]
+    for name, kind, unit, values in zip(phase.names, kinds, units, np.hstack([phase.states, phase.controls, phase.paths]).T, strict=True):
+        numbers = [f"{value + 0.0:.6g}" for value in (values[0], values[-1], values.min(), values.max())]
+        cells = _cells((name, kind, unit, *numbers), "td")
+        rows.append(f"{cells}<td>{_line(phase.time, values)}</td>")
+    table = "".join(f"<tr>{row}</tr>" for row in rows)
+    title = f"{escape(phase.name)}: {phase.t0:.6g} to {phase.tf:.6g} {escape(phase.time_unit)}, {len(phase.time)} nodes"
+    return f"<div><b>{title}</b></div><table>{table}</table>"
+
+
+def _cells(cells: tuple[str, ...], tag: str) -> str:
+    """Cells of a row: the first three flush left."""
+    sides = ("left", "left", "left", *["right"] * len(cells))
+    style = 'style="padding:1px 8px;text-align:'
+    return "".join(f'<{tag} {style}{side}">{escape(cell)}</{tag}>' for cell, side in zip(cells, sides, strict=False))
+
+
+def _line(times: np.ndarray, values: np.ndarray) -> str:
+    """An SVG of values over time; a constant, up to round-off, is a level line in the middle."""
+    wide, high, most = 140, 26, 120  # pixels; values that are joined
+    some = np.unique(np.linspace(0, len(times) - 1, min(most, len(times))).round().astype(int))
+    x, y = times[some], values[some]
+    span, height = float(np.ptp(x)), float(np.ptp(y))
+    across = 2 + (wide - 4) * (x - x[0]) / (span or 1.0)
+    flat = height <= 1e-9 * max(float(np.abs(y).max()), 1e-300)
+    up = np.full(len(y), 0.5 * high) if flat else high - 3 - (high - 6) * (y - y.min()) / height
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up, strict=True))
+    line = f'<polyline points="{points}" fill="none" stroke="#0072B2" stroke-width="1.3"/>'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide}" height="{high}" role="img" aria-label="over time">{line}</svg>'

@@ -11,7 +11,7 @@ from macs.fronts.provenance import merged_stats, more_costs
 from problems import load
 from transcription import DFET
 from transcription.inner import Ipopt, Newton, Propagate, inner_solver
-from transcription.inner.effort import newton_step, propagation
+from transcription.inner.base import newton_work, propagation_work
 
 METHOD = DFET(3, 3)
 
@@ -25,7 +25,7 @@ def evaluated(inner, count: int = 4) -> tuple[Bilevel, int]:
     return evaluator, len(evaluator.nlp.variables)
 
 
-@pytest.mark.parametrize(("inner", "part"), [(Ipopt(), lambda nlp: 1.0), (Newton(), newton_step), (Propagate(), propagation)])
+@pytest.mark.parametrize(("inner", "part"), [(Ipopt(), lambda nlp: 1.0), (Newton(), newton_work), (Propagate(), propagation_work)])
 def test_iterations_count_by_what_they_take(inner, part):
     evaluator, n = evaluated(inner)
     each = part(evaluator.nlp)
@@ -34,7 +34,7 @@ def test_iterations_count_by_what_they_take(inner, part):
 
 def test_less_is_taken_without_derivatives():
     nlp = METHOD.nlp(load("goddard"))
-    assert 0.0 < propagation(nlp) < newton_step(nlp) < 1.0
+    assert 0.0 < propagation_work(nlp) < newton_work(nlp) < 1.0
 
 
 def test_what_goes_to_ipopt_counts_more(monkeypatch):
@@ -43,7 +43,7 @@ def test_what_goes_to_ipopt_counts_more(monkeypatch):
     monkeypatch.setattr(Newton, "solve", lambda self, *given, **more: solve(Newton(max_iterations=1), *given, **more))
     evaluator, n = evaluated(inner_solver("auto"))
     counts = evaluator.counts
-    light = newton_step(evaluator.nlp)
+    light = newton_work(evaluator.nlp)
     assert counts.fallbacks == 4 and counts.work == round(n * (counts.inner_iterations - (1.0 - light) * 4))
 
 

@@ -11,7 +11,7 @@ from macs.fronts.points import Points
 from problems import load
 from problems.cases.standard import published
 from transcription import DFET, Collocation, SingleShooting
-from transcription.trajectories.constancy import hamiltonian_variation
+from transcription.trajectories.costates import hamiltonian_variation
 
 COARSE = DFET(4, 3, basis="bernstein")
 SAID = "the Hamiltonian varies"

@@ -9,7 +9,7 @@ import pytest
 from macs import MACS, Front, optimize
 from problems import Problem, load
 from transcription import DFET, MultipleShooting, from_dict
-from transcription.meshes.scales import state_scales
+from transcription.meshes.errors import state_scales
 from transcription.trajectories.simulate import simulate
 
 

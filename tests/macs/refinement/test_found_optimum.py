@@ -17,7 +17,7 @@ from problems import Problem, load
 from problems.cases.standard import published
 from transcription import DFET
 from transcription.meshes.verdict import Wanted
-from transcription.nlp.scaling import nlp_scales
+from transcription.nlp.program import nlp_scales
 
 
 def back_to_the_side() -> Problem:

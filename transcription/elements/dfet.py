@@ -13,29 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 from problems.checks import check_choice, check_count
-from problems.compiled import CompiledPhase, CompiledProblem
-from problems.problem import Problem
 
-from ..assembly import Assembly
-from ..base import NLP
-from ..elements.phase import ElementsPhase
-from ..elements.points import need_derivatives
-from ..elements.tables import Tables
-from ..meshed import Meshed
-from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
-from ..phases.writer import Ends
-from .tables import dfet_tables
+from .phase import ElementsMethod
+from .tables import Tables, dfet_tables
 
 BASES = ("lobatto", "bernstein")
 
 
 @dataclass(frozen=True)
-class DFET(Meshed):
+class DFET(ElementsMethod):
     """Direct Finite Elements in Time.
 
     Parameters
@@ -74,8 +64,6 @@ class DFET(Meshed):
     basis: str = "lobatto"
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = None
 
-    orders_controls = True
-    moves_edges = True
     word = "dfet"
     examples = "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, dfet:40x2:bernstein:1 (controls of order 1)"
 
@@ -85,46 +73,23 @@ class DFET(Meshed):
             check_count("DFET: control_order", self.control_order, 0)
         check_choice("DFET: basis", self.basis, BASES)
 
-    def degree_of_controls(self, order: int, own: int | None = None) -> int:
-        """q, where states have degree `order`, on a mesh whose own degree of controls is `own`."""
-        return next((q for q in (own, self.control_order) if q is not None), order)
-
     def remeshed(self, meshes: Mapping[str, PhaseMesh], *, bounded: bool = False) -> DFET:
-        """See `Meshed.remeshed`: the coefficients of Bernstein polynomials bound them."""
+        """The coefficients of Bernstein polynomials bound them."""
         other = super().remeshed(meshes)
         return replace(other, basis="bernstein") if bounded else other
 
     def alternatives(self) -> tuple[DFET, ...]:
-        """See `Meshed.alternatives`: the other basis; controls of the degree of the states; both; a degree more."""
+        """The other basis; controls of the degree of the states; both; a degree more."""
         return self.variants("order", basis=next(one for one in BASES if one != self.basis))
 
     @classmethod
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> DFET:
-        """See `Transcription.from_word`."""
-        orders = [int(one) for one in options if one.isdecimal()]
-        bases = [one for one in options if not one.isdecimal()]
-        if len(numbers) != 2 or len(orders) > 1 or len(bases) > 1:
-            raise ValueError(f"write it as {cls.examples}")
-        return cls(*numbers, control_order=orders[0] if orders else None, basis=bases[0] if bases else "lobatto")
+        control_order, basis = cls.options_of(numbers, options)
+        return cls(numbers[0], numbers[1], control_order=control_order, basis=basis or "lobatto")
 
     def to_word(self) -> str:
-        """See `Transcription.to_word`."""
         options = [*([] if self.basis == "lobatto" else [self.basis]), *([] if self.control_order is None else [str(self.control_order)])]
         return ":".join([super().to_word(), *options])
 
-    def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
-        """Write `problem` as an NLP; see `Transcription.transcribe`."""
-        compiled = problem.compile()
-        self.check_phases(compiled)
-        for phase in compiled.phases:
-            need_derivatives(phase, "DFET")
-
-        @cache
-        def tables(order: int, control_order: int) -> Tables:
-            return dfet_tables(order, control_order, self.basis)
-
-        def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> ElementsPhase:
-            mesh = self.mesh_of(phase.name)
-            return ElementsPhase(mesh, tables(mesh.order, self.degree_of_controls(mesh.order, mesh.control_order)), phase, layout, ends)
-
-        return Assembly(compiled, writer).nlp(self)
+    def tables(self, order: int, control_order: int) -> Tables:
+        return dfet_tables(order, control_order, self.basis)

@@ -30,29 +30,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, replace
-from functools import cache
 from typing import Any
 
 from problems.checks import check_choice, check_count
-from problems.compiled import CompiledPhase, CompiledProblem
-from problems.problem import Problem
 
-from ..assembly import Assembly
-from ..base import NLP
-from ..elements.phase import ElementsPhase
-from ..elements.points import need_derivatives
-from ..elements.tables import Tables
-from ..meshed import Meshed
-from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
-from ..phases.writer import Ends
-from .tables import POINTS, collocation_tables, degree_of_controls
+from .phase import ElementsMethod
+from .tables import POINTS, Tables, collocation_tables, control_degree
 
 CONTROLS = ("polynomial", "bernstein")
 
 
 @dataclass(frozen=True)
-class Collocation(Meshed):
+class Collocation(ElementsMethod):
     """Collocation of states and controls that are polynomials on each interval.
 
     Bounds of states hold at the points and at the ends of intervals, path constraints as well. Where an end is no point, controls are
@@ -99,8 +89,6 @@ class Collocation(Meshed):
     control: str = "polynomial"
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = None
 
-    orders_controls = True
-    moves_edges = True
     word = POINTS
     examples = (
         "radau:10x4 (10 intervals of degree 4), gauss:1x40 (one polynomial), lobatto:20x3:1 (controls of order 1), "
@@ -128,59 +116,40 @@ class Collocation(Meshed):
 
     @property
     def elements(self) -> int:  # type: ignore[override]
-        """See `Meshed`: the intervals."""
+        """The intervals."""
         return self.intervals
 
     @property
     def order(self) -> int:  # type: ignore[override]
-        """See `Meshed`: the degree."""
+        """The degree."""
         return self.degree
 
     def most_control_order(self, order: int) -> int:
-        """See `Meshed.most_control_order`."""
-        return degree_of_controls(self.points, order)
+        return control_degree(self.points, order)
 
     def remeshed(self, meshes: Mapping[str, PhaseMesh], *, bounded: bool = False) -> Collocation:
-        """See `Meshed.remeshed`: the coefficients of Bernstein polynomials bound them; those of high degrees would lose too many digits."""
+        """The coefficients of Bernstein polynomials bound them; those of high degrees would lose too many digits."""
         other = super().remeshed(meshes)
         highest = max([other.degree, *(mesh.order for mesh in other.meshes.values())])
         return replace(other, control="bernstein") if bounded and highest <= self.highest_order else other
 
     def alternatives(self) -> tuple[Collocation, ...]:
-        """See `Meshed.alternatives`: the other controls; of the full degree; both; a degree more."""
+        """The other controls; of the full degree; both; a degree more."""
         return self.variants("degree", control=next(one for one in CONTROLS if one != self.control))
 
     @classmethod
     def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Collocation:
-        """See `Transcription.from_word`."""
-        points, *others = options
-        orders = [int(one) for one in others if one.isdecimal()]
-        controls = [one for one in others if not one.isdecimal()]
-        if len(numbers) != 2 or len(orders) > 1 or len(controls) > 1:
-            raise ValueError(f"write it as {cls.examples}")
-        return cls(*numbers, points=points, control_order=orders[0] if orders else None, control=controls[0] if controls else "polynomial")
+        control_order, control = cls.options_of(numbers, options[1:])
+        return cls(numbers[0], numbers[1], points=options[0], control_order=control_order, control=control or "polynomial")
 
     def to_word(self) -> str:
-        """See `Transcription.to_word`."""
         controls = [] if self.control == "polynomial" else [self.control]
         orders = [] if self.control_order is None else [str(self.control_order)]
         return ":".join([self.points, f"{self.intervals}x{self.degree}", *controls, *orders])
 
-    def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
-        """Write `problem` as an NLP; see `Transcription.transcribe`."""
-        compiled = problem.compile()
-        self.check_phases(compiled)
-        for phase in compiled.phases:
-            need_derivatives(phase, "Collocation")
+    def degree_of_controls(self, order: int, own: int | None = None) -> int:
+        """The degree of controls on a mesh whose own one is `own`, where states have degree `order`: no more than the points determine."""
+        return min(super().degree_of_controls(order, own), self.most_control_order(order))
 
-        @cache
-        def tables(degree: int, control_order: int) -> Tables:
-            return collocation_tables(self.points, degree, control_order, self.control == "bernstein")
-
-        def writer(phase: CompiledPhase, layout: Layout, ends: Ends) -> ElementsPhase:
-            mesh = self.mesh_of(phase.name)
-            most = self.most_control_order(mesh.order)
-            own = next((q for q in (mesh.control_order, self.control_order) if q is not None), most)
-            return ElementsPhase(mesh, tables(mesh.order, min(own, most)), phase, layout, ends)
-
-        return Assembly(compiled, writer).nlp(self)
+    def tables(self, order: int, control_order: int) -> Tables:
+        return collocation_tables(self.points, order, control_order, self.control == "bernstein")

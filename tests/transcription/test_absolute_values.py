@@ -1,0 +1,101 @@
+"""Integrals of absolute values: smooth for gradient tools where they are minimised or bounded above, the same numbers everywhere else."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from macs import optimize
+from problems import Problem
+from transcription import DFET, MultipleShooting, SingleShooting
+
+DISTANCE, TIME = 3.0, 4.0
+
+
+def transfer(state=lambda problem, fuel: problem.minimize("fuel", fuel), integral=lambda phase, u: phase.integral(ca.fabs(u))) -> Problem:
+    """From rest to rest over a distance in a time, with a thrust of at most 1 either way."""
+    problem = Problem("transfer")
+    phase = problem.phase("push", t0=0.0, tf=TIME)
+    phase.state("x", bounds=(-10, 10), initial=0, final=DISTANCE)
+    v = phase.state("v", bounds=(-5, 5), initial=0, final=0)
+    u = phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=v, v=u)
+    state(problem, integral(phase, u))
+    return problem
+
+
+@pytest.mark.parametrize(
+    "method", [DFET(4, 2), DFET(4, 2, basis="bernstein"), SingleShooting(9), MultipleShooting(4, steps=3, control_nodes=9)], ids=str
+)
+def test_least_fuel_is_bang_off_bang(method):
+    """Thrust, coast, thrust against: each burn lasts (T - sqrt(T^2 - 4 d)) / 2 = 1, and ends on this mesh."""
+    point = optimize(transfer(), method, starts=1)
+    assert point.status == "converged" and point.optimality < 1e-6
+    assert point.objectives["fuel"] == pytest.approx(TIME - np.sqrt(TIME**2 - 4 * DISTANCE), abs=1e-6)
+    assert point.trajectory["push"].at(np.array([0.5, 2.0, 3.6]))["u"] == pytest.approx([1.0, 0.0, -1.0], abs=1e-5)
+    assert point.simulate().objectives["fuel"] == pytest.approx(2.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "integral",
+    [
+        lambda phase, u: 3 * phase.integral(ca.fabs(u) / 3.0),
+        lambda phase, u: -phase.integral(phase["v"] - (ca.fabs(2 * u) + ca.fabs(u)) / 3) + DISTANCE,
+        lambda phase, u: phase.integral(ca.norm_1(u)),
+    ],
+)
+def test_terms_and_factors_are_no_obstacle(integral):
+    point = optimize(transfer(integral=integral), DFET(4, 2), starts=1)
+    assert point.status == "converged" and point.objectives["fuel"] == pytest.approx(2.0, abs=1e-7)
+
+
+def test_two_controls_each_have_their_own():
+    """Two such transfers at once, along two axes; distances 3 and 1.75 need burns of 1 and of 0.5, two each."""
+    problem = Problem("plane")
+    phase = problem.phase("push", t0=0.0, tf=TIME)
+    rates, controls = {}, []
+    for axis, distance in (("x", DISTANCE), ("y", -1.75)):
+        phase.state(axis, bounds=(-10, 10), initial=0, final=distance)
+        v = phase.state(f"v{axis}", bounds=(-5, 5), initial=0, final=0)
+        u = phase.control(f"u{axis}", bounds=(-1, 1))
+        rates |= {axis: v, f"v{axis}": u}
+        controls.append(u)
+    phase.dynamics(**rates)
+    problem.minimize("fuel", phase.integral(ca.dot(ca.DM([1, 2]), ca.fabs(ca.vertcat(*controls)))))
+    assert problem.compile().phases[0].sized == (0, 1)
+    point = optimize(problem, DFET(8, 2), starts=1)
+    assert point.status == "converged" and point.objectives["fuel"] == pytest.approx(2 * 1.0 + 2 * 2 * 0.5, abs=1e-7)
+
+
+@pytest.mark.parametrize("method", [DFET(3, 2), MultipleShooting(6)], ids=str)
+def test_candidates_are_scored_by_the_absolute_values_themselves(method):
+    nlp = method.transcribe(transfer())
+    Z = nlp.propagate(nlp.first_guess(np.random.default_rng(0).uniform(-1, 1, (5, len(nlp.free)))))
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    for z, F in zip(Z, nlp.evaluate(Z)[0], strict=True):
+        flight = nlp.unpack(z)["push"]
+        lengths = np.diff(flight.state.edges)
+        total = sum(0.5 * h * weights @ np.abs(flight.controls_on(j, nodes)[:, 0]) for j, h in enumerate(lengths))
+        assert F[0] == pytest.approx(total, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        lambda problem, fuel: problem.minimize("fuel", -fuel),
+        lambda problem, fuel: problem.minimize("fuel", (fuel - 1.0) ** 2),
+        lambda problem, fuel: (problem.minimize("fuel", fuel), problem.constraint("least", fuel, lower=1.0)),
+    ],
+)
+def test_where_large_is_good_they_are_left_as_they_are(state):
+    assert transfer(state).compile().phases[0].sized == () and transfer().compile().phases[0].sized == (0,)
+
+
+def test_by_shooting_what_varies_on_an_interval_is_left_as_it_is():
+    def rows(method: MultipleShooting, integrand) -> int:
+        problem = transfer(integral=lambda phase, u: phase.integral(integrand(phase)))
+        return sum("absolute values" in label for label in method.transcribe(problem).g_labels)
+
+    assert rows(MultipleShooting(6), lambda phase: ca.fabs(phase["u"]) + ca.fabs(phase["v"]) + ca.fabs(phase.time * phase["u"])) == 2 * 6
+    assert rows(MultipleShooting(6, control="linear"), lambda phase: ca.fabs(phase["u"])) == 0

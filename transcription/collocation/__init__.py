@@ -1,1 +1,0 @@
-"""Collocation at Gauss, Radau, Lobatto and Chebyshev points."""

@@ -1,1 +1,0 @@
-"""Direct Finite Elements in Time."""
