@@ -6,12 +6,13 @@ import importlib.util
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from runs.bench import KINDS, command, sources
-from runs.bench.measured import Row
+from runs.bench import BENCHES, sources
+from runs.bench.contract import Row
 from runs.cli import main
 from runs.report.page_header import PageHeader, digest
 
@@ -31,18 +32,31 @@ def test_every_page_has_a_header_and_a_command_that_exists(page):
 
 
 def test_every_benchmark_is_of_files():
-    for kind in KINDS:
+    for kind in BENCHES:
         files = sources(kind)
-        assert len(files) > 2 and all(file.is_file() for file in files) and len(set(files)) == len(files)
-    assert any(file.name == "uf.py" for file in sources("uf")) and sources("study")[0].name == "study.py"
+        assert len(files) > 1 and all(file.is_file() for file in files) and len(set(files)) == len(files)
+    assert any(file.name == "functions.py" for file in sources("uf")) and sources("study")[0].name == "study.py"
     with pytest.raises(ValueError, match="no benchmark 'none'"):
         sources("none")
 
 
+def stub(monkeypatch, ends: BaseException | None = None) -> None:
+    """The benchmark of populations with given values; it may end by Ctrl-C."""
+
+    def prepare(case, effort, steps):
+        def measured(number):
+            yield from (Row.once("case", who, speed=5.0, candidates=100.0) for who in ("one by one", "in one call"))
+            if ends:
+                raise ends
+
+        return measured
+
+    monkeypatch.setitem(BENCHES, "population", replace(BENCHES["population"], prepare=prepare))
+
+
 def made(tmp_path, monkeypatch) -> Path:
     """The page of a benchmark whose values are given."""
-    rows = [Row("case", who, {"speed": [5.0], "candidates": [100.0]}) for who in ("one by one", "in one call")]
-    monkeypatch.setattr(command, "_run", lambda one, found, effort: found.extend(rows) or False)
+    stub(monkeypatch)
     page = tmp_path / "bench-population.md"
     assert main(["bench", "population", "--quick", "--page", str(page)]) == 0
     return page
@@ -84,8 +98,7 @@ def test_a_page_of_a_study_is_of_its_file():
 
 
 def test_what_was_interrupted_makes_no_page(tmp_path, monkeypatch, capsys):
-    rows = [Row("case", who, {"speed": [5.0], "candidates": [100.0]}) for who in ("one by one", "in one call")]
-    monkeypatch.setattr(command, "_run", lambda one, found, effort: found.extend(rows) or True)
+    stub(monkeypatch, KeyboardInterrupt())
     main(["bench", "population", "--page", str(tmp_path / "a.md")])
     assert "POPULATIONS" in capsys.readouterr().out and not list(tmp_path.iterdir())
 

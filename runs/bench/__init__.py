@@ -1,9 +1,7 @@
-"""Benchmarks: ratios against the alternatives, measured side by side in one run. Inner levels in `inner`, on the batches of `cases`;
-meshes by a density in `density`; transcriptions in `methods`; populations simulated in one call in `population`; searches in `search`,
-batches of them in `study`; published optima in `standard`; one optimum beside other programs in `peers`."""
+"""Benchmarks: ratios against the alternatives, measured side by side in one run. `contract` says what a benchmark is, `command` has the
+table of all."""
 
-from .command import KINDS, SEEDED, STUDIES, bench
-from .functions import solvers_of
-from .page import Effort, header_of, sources
+from .command import BENCHES, bench, header_of, sources
+from .contest import solvers_of
 
-__all__ = ["KINDS", "SEEDED", "STUDIES", "Effort", "bench", "header_of", "solvers_of", "sources"]
+__all__ = ["BENCHES", "bench", "header_of", "solvers_of", "sources"]

@@ -1,100 +1,125 @@
-"""`macs bench`: measures, prints and saves, also after Ctrl-C."""
+"""`macs bench`: the table of all benchmarks; measures, prints and saves, also after Ctrl-C."""
 
 from __future__ import annotations
 
+import shlex
 import sys
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
+from macs.io.atomic import write_whole
 from macs.io.interrupts import Stopped
 
-from . import density, fronts, functions, inner, methods, passages, peers, population, prefer, scale, search, standard, study
-from .measured import Row, save
-from .page import Effort, header_of, write_page
-from .scale import generation
+from ..report.page_header import PageHeader, digest
+from .contest import CONTESTS
+from .contract import Bench, Row, save
+from .density import DENSITY
+from .growth import GENERATION, SCALE
+from .inner import INNER, POPULATION
+from .passages import PASSAGES
+from .peers import PEERS
+from .prefer import PREFER
+from .published import METHODS, STANDARD
+from .searches import FRONT, SEARCH
+from .study import STUDY
 
-BENCHMARKS: dict[str, Any] = {
-    **{name: functions.Contest(name) for name in functions.NAMES},
-    "density": density,
-    "front": fronts,
-    "generation": generation,
-    "inner": inner,
-    "methods": methods,
-    "passages": passages,
-    "peers": peers,
-    "population": population,
-    "prefer": prefer,
-    "scale": scale,
-    "search": search,
-    "standard": standard,
-    "study": study,
+BENCHES: dict[str, Bench] = {
+    **CONTESTS,
+    "density": DENSITY,
+    "front": FRONT,
+    "generation": GENERATION,
+    "inner": INNER,
+    "methods": METHODS,
+    "passages": PASSAGES,
+    "peers": PEERS,
+    "population": POPULATION,
+    "prefer": PREFER,
+    "scale": SCALE,
+    "search": SEARCH,
+    "standard": STANDARD,
+    "study": STUDY,
 }
-KINDS = tuple(sorted(BENCHMARKS))
-SEEDS, QUICK_SEEDS = (1, 2, 3, 4, 5), (1,)
-SEEDED = (*functions.NAMES, "prefer", "search")
-"""Benchmarks that are repeated with other seeds."""
-STUDIES = functions.NAMES
-"""Benchmarks whose runs may be made at the same time, and kept."""
 
 
-def bench(kinds: Sequence[str], effort: Effort, path: str | None, page: str | None = None) -> bool:
-    """Run some of `KINDS`, one after the other; write all numbers to the CSV file `path`, if there is one.
+def bench(
+    kinds: Sequence[str],
+    *,
+    quick: bool = False,
+    seeds: int | None = None,
+    csv: str | None = None,
+    page: str | None = None,
+    **studies: Any,
+) -> bool:
+    """Run some of `BENCHES`, one after the other; write all numbers to the file `csv`, if there is one.
 
-    The report of a single one is also written to `page`, if there is one and it was not interrupted. Returns whether all targets are met,
-    see `Target`.
+    `studies` are the settings `jobs`, `keep` and `solvers` of an `Effort`. The report of a single benchmark is also written to `page`, if
+    there is one and it was not interrupted. Returns whether all targets are met.
     """
-    header = header_of(kinds[0], effort, page) if page else None
+    header = header_of(kinds[0], page, quick=quick, seeds=seeds, **studies) if page else None
     measured: list[tuple[str, Row]] = []
     missed: list[str] = []
     for kind in kinds:
-        rows: list[Row] = []
-        ended = _run(kind, rows, effort)
+        one, rows = BENCHES[kind], list[Row]()
+        effort = one.quick if quick else one.full
+        effort = replace(effort, rounds=seeds) if seeds and one.seeded else effort
+        effort = replace(effort, **studies) if one.kept else effort
+        interrupted = _measure(one, rows, effort)
         measured += [(kind, row) for row in rows]
         if rows:
-            text = BENCHMARKS[kind].report(rows)
+            text = one.report(rows)
             print(text, end="\n\n", flush=True)
-            if page and header and not ended:
-                write_page(page, kind, header, text)
+            if page and header and not interrupted:
+                write_whole(page, f"{header}\n\n# `macs bench {kind}`\n\nMade by `{header.command}`.\n\n```text\n{text}\n```\n".encode())
                 print(f"page in {page}")
-            missed += [f"{kind}: {one.what}" for one in BENCHMARKS[kind].targets(rows) if not one.met]
-        if ended:
-            kept = f"; the same command goes on with the searches in {effort.keep}" if effort.keep and kind in STUDIES else ""
-            print(f"interrupted: these are the values measured until then{kept}", file=sys.stderr)
+            missed += [f"{kind}: {target.what}" for target in one.targets(rows) if not target.met]
+        if interrupted:
+            again = f"; the same command goes on with the searches in {effort.keep}" if effort.keep else ""
+            print(f"interrupted: these are the values measured until then{again}", file=sys.stderr)
             break
-    if path:
-        save(path, measured)
-        print(f"values in {path}")
+    if csv:
+        save(csv, measured)
+        print(f"values in {csv}")
     if missed and len(kinds) > 1:
         print("MISSED:", *missed, sep="\n  ")
     return not missed
 
 
-def _run(kind: str, rows: list[Row], effort: Effort) -> bool:
+def _measure(one: Bench, rows: list[Row], effort: Any) -> bool:
     """Measure; returns whether Ctrl-C was pressed."""
-    quick, count = effort.quick, effort.seeds
-    seeds = tuple(range(1, count + 1)) if count else QUICK_SEEDS if quick else SEEDS
-    cases = [case for case in inner.INNER if case.quick or not quick]
-    sets = {name: BENCHMARKS[name] for name in functions.NAMES}
-    whole = {"seeds": count or functions.SEEDS, "jobs": effort.jobs, "keep": effort.keep, "only": effort.solvers or None}
-    work: dict[str, Callable[[], None]] = {
-        **{name: (partial(one.quick, rows) if quick else partial(one.bench, rows, **whole)) for name, one in sets.items()},
-        "density": lambda: density.bench_density(rows, density.QUICK if quick else density.CASES),
-        "front": lambda: fronts.bench_fronts(rows, fronts.QUICK if quick else fronts.Effort()),
-        "generation": lambda: generation.bench_generation(rows, generation.QUICK if quick else generation.FULL),
-        "inner": lambda: inner.bench_inner(rows, inner.QUICK if quick else inner.Effort(), cases),
-        "methods": lambda: methods.bench_methods(rows, methods.Effort(methods.QUICK) if quick else methods.Effort()),
-        "passages": lambda: passages.bench_passages(rows, passages.QUICK if quick else passages.Effort()),
-        "peers": lambda: peers.bench_peers(rows, peers.QUICK if quick else peers.Effort()),
-        "population": lambda: population.bench_population(rows, population.QUICK if quick else population.Effort()),
-        "prefer": lambda: prefer.bench_prefer(rows, seeds, quick),
-        "scale": lambda: scale.bench_scale(rows, scale.QUICK if quick else scale.FULL),
-        "search": lambda: search.bench_search(rows, seeds, quick),
-        "standard": lambda: standard.bench_standard(rows, standard.Effort(standard.QUICK) if quick else standard.Effort()),
-        "study": lambda: study.bench_study(rows, study.QUICK if quick else study.Effort()),
-    }
     try:
-        work[kind]()
+        one.measure(rows, effort)
     except (Stopped, KeyboardInterrupt):
         return True
     return False
+
+
+def sources(kind: str) -> list[Path]:
+    """The files of a benchmark, in a fixed order. The search itself is none of them: what is measured is stated here, and a page's version
+    and date say of which search.
+
+    Raises ValueError if there is no such benchmark.
+    """
+    if kind not in BENCHES:
+        raise ValueError(f"there is no benchmark '{kind}'")
+    return BENCHES[kind].sources
+
+
+def header_of(
+    kind: str,
+    page: str | PathLike[str],
+    *,
+    quick: bool = False,
+    seeds: int | None = None,
+    jobs: int = 1,
+    keep: str | None = None,
+    solvers: Sequence[str] = (),
+) -> PageHeader:
+    """The header of the page of a benchmark. Raises ValueError if it cannot be written into a comment."""
+    words = ["--quick"] if quick else []
+    words += ["--seeds", str(seeds)] if seeds else []
+    words += ["--jobs", str(jobs)] if jobs > 1 else []
+    words += ["--solvers", *solvers] if solvers else []
+    return PageHeader.now(shlex.join(["macs", "bench", kind, *words, "--page", str(page)]), digest(*sources(kind)))

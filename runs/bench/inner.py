@@ -1,147 +1,176 @@
-"""Benchmark of inner levels: the same batches in turn, so that a noisy machine affects all alike."""
+"""Benchmarks of inner levels on batches of candidates as the search sends them, and of whole populations propagated in one call."""
 
 from __future__ import annotations
 
-import os
-import time
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
+import timeit
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
-from unittest.mock import patch
 
+import casadi as ca
 import numpy as np
 
 from macs.io.console import Steps
-from transcription import NLP
+from problems import Problem, load
+from transcription import DFET, NLP, Smooth, parse
 from transcription.base import CONVERGED
 from transcription.inner import InnerResult, InnerSolver, Ipopt, Newton, Projection, Propagate
 from transcription.numerics.batched import compiler
 
-from .cases import BATCH, INNER, Batch, Case
-from .measured import Column, Row, Target, short, table, verdicts
+from .contract import Bench, Effort, Row, Target, column, compiling, rounds_of, short, side_by_side
 
 BASELINE, PROJECTION, DEFAULT = "ipopt, constant objective", "ipopt, projection", "projection"
-EXACT = Ipopt()
-EXACT_TOLERANCE = 1e-11
-AT_LEAST = 5e-3
-"""Seconds for which a fast solver repeats a batch, so that the clock and a hiccup matter less."""
-RANGES = 20
-"""Random candidates whose feasible points give the objectives' ranges."""
+BATCH = 10
+"""Candidates in a batch, as the search sends them: one for each agent."""
+
+Batch = tuple[np.ndarray, np.ndarray | None]
+"""Candidates (BATCH, d), and the vectors (BATCH, n) that they start from if they are warm."""
 
 
 @dataclass(frozen=True)
-class Effort:
-    """Size of a measurement: rounds for each case, as many as fit into some seconds; in how many of them the exact projection is solved;
-    and whether functions are measured interpreted too, where they can be compiled."""
+class InnerCase:
+    """Batches of candidates on one mesh."""
 
-    least: int = 5
-    rounds: int = 40
-    seconds: float = 12.0
-    checked: int = 6
-    interpreted: bool = True
+    name: str
+    make: Callable[[], Problem]
+    mesh: DFET
+    warm: bool = False  # candidates near feasible points, starting from their states; else uniformly random ones, from a first guess
+    tolerance: float = 1e-6
+    # Every candidate is feasible when it is propagated, within the bounds of states: propagation alone is an inner level here.
+    propagates: bool = False
+    asked: Mapping[str, float] = field(default_factory=dict)  # target of "projection": "speed" at least, "moved" at most
 
-
-QUICK = Effort(least=2, rounds=6, seconds=1.0, checked=1, interpreted=False)
-
-
-@dataclass
-class Contender:
-    """An inner level and the NLP that it works on; `when` is whether that may be compiled, see `compiling`."""
-
-    row: Row
-    solver: InnerSolver
-    nlp: NLP
-    when: str
-
-    def solve(self, candidates: np.ndarray, warm: np.ndarray | None, tolerance: float) -> InnerResult:
-        with compiling(self.when):
-            return self.solver.solve(self.nlp, candidates, warm, tolerance=tolerance)
-
-    def timed(self, candidates: np.ndarray, warm: np.ndarray | None, tolerance: float) -> tuple[float, InnerResult]:
-        """Seconds for each candidate, and the results."""
-        began, times = time.perf_counter(), 0
-        while True:
-            result = self.solve(candidates, warm, tolerance)
-            times, elapsed = times + 1, time.perf_counter() - began
-            if elapsed >= AT_LEAST:
-                return elapsed / times / len(candidates), result
+    def batch(self, nlp: NLP, rng: np.random.Generator) -> Batch:
+        """A batch of candidates, with a warm start if the case has one."""
+        lower, upper, span = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.span[nlp.free]
+        cold = lower + rng.random((BATCH, len(span))) * span
+        if not self.warm:
+            return cold, None
+        result = Projection().solve(nlp, cold, tolerance=self.tolerance)
+        feasible = result.z[result.status == CONVERGED]
+        if not len(feasible):
+            raise RuntimeError(f"{self.name}: no feasible point to begin with")
+        known = feasible[np.arange(BATCH) % len(feasible)]
+        # About a twentieth of the bounds away from the feasible point.
+        return np.clip(known[:, nlp.free] + 0.05 * span * rng.standard_normal(cold.shape), lower, upper), known
 
 
-def bench_inner(rows: list[Row], effort: Effort, cases: Sequence[Case] = INNER) -> None:
-    """Measure all cases; `rows` are filled as values become known, also if `Stopped` ends it."""
-    with Steps("inner levels", len(cases)) as steps:
-        for case in cases:
-            steps.begin(case.name)
-            _measure(case, rows, effort, steps)
+def corridor() -> Problem:
+    """Following a bend at speeds to be chosen, between walls so near that one or the other is in the way all along."""
+    problem = Problem("corridor")
+    walk = problem.phase("walk", t0=0.0, tf=(2.0, 4.0))
+    x, y = walk.state("x", bounds=(-1, 9), initial=0), walk.state("y", bounds=(-3, 3), initial=0)
+    u, v = walk.control("u", bounds=(0.5, 2.0)), walk.control("v", bounds=(-2.0, 2.0))
+    walk.dynamics(x=u, y=v)
+    walk.path("walls", y - 0.5 * ca.sin(x), lower=-0.05, upper=0.05)
+    problem.minimize("effort", walk.integral(u**2 + v**2))
+    problem.maximize("distance", walk.final(x))
+    return problem
 
 
-def _measure(case: Case, rows: list[Row], effort: Effort, steps: Steps) -> None:
-    rng = np.random.default_rng(0)
-    contenders = _contenders(case, effort)
-    nlp, when = contenders[0].nlp, contenders[0].when
-    with compiling(when):
-        ranges = _ranges(nlp, case.tolerance)
-        batches = [case.batch(nlp, rng) for _ in range(effort.rounds)]
-    _warm_up(case, contenders, batches, effort.seconds)
-    began = time.perf_counter()
-    for i, (candidates, warm) in enumerate(batches):
-        steps.check()
-        exact = EXACT.solve(nlp, candidates, warm, tolerance=EXACT_TOLERANCE) if i < effort.checked else None
-        # The order changes, so that none always follows the slow one.
-        turn = i % len(contenders)
-        timed = {id(c): c.timed(candidates, warm, case.tolerance) for c in contenders[turn:] + contenders[:turn]}
-        baseline, _ = timed[id(contenders[0])]
-        if i == 0:
-            rows += [contender.row for contender in contenders]
-        for contender in contenders:
-            seconds, result = timed[id(contender)]
-            contender.row.add(speed=baseline / seconds, seconds=seconds, **_quality(result, exact, ranges))
-        if i + 1 >= effort.least and time.perf_counter() - began > effort.seconds:
-            return
+def needle() -> Problem:
+    """Balancing for thirty-two time constants: no propagation reaches the end, whatever the control."""
+    problem = Problem("needle")
+    hold = problem.phase("hold", t0=0.0, tf=(7.0, 8.0))
+    x = hold.state("x", bounds=(-2, 2), initial=0.5, final=0.0)
+    u = hold.control("u", bounds=(-10, 10))
+    hold.dynamics(x=4 * x + u)
+    problem.minimize("effort", hold.integral(u**2))
+    problem.minimize("time", hold.tf)
+    return problem
 
 
-def _contenders(case: Case, effort: Effort) -> list[Contender]:
-    """The baseline comes first."""
-    problem = case.make()
-    when = "always" if compiler() else "0"
+GODDARD = InnerCase("goddard, cold", partial(load, "goddard"), DFET(4, 6), asked={"speed": 5})
+ORBIT = InnerCase("orbit_rise, cold", partial(load, "orbit_rise"), DFET(30, 1), propagates=True, asked={"speed": 100})
+NEEDLE = InnerCase("needle, cold", needle, DFET(8, 3))
+SHORT = (
+    GODDARD,
+    replace(GODDARD, name="goddard, warm", warm=True, asked={"speed": 15, "moved": 0.07}),
+    replace(ORBIT, name="orbit_rise, cold, 1e-9", tolerance=1e-9),
+    replace(ORBIT, name="orbit_rise, warm, 1e-9", warm=True, tolerance=1e-9),
+    NEEDLE,
+)
+CASES = (
+    *SHORT,
+    ORBIT,
+    replace(ORBIT, name="orbit_rise, warm", warm=True),
+    InnerCase("corridor, cold", corridor, DFET(4, 2)),
+    InnerCase("corridor, warm", corridor, DFET(4, 2), warm=True),
+    replace(NEEDLE, name="needle, warm", warm=True),
+)
+
+
+def contenders(case: InnerCase) -> dict[str, tuple[InnerSolver, NLP, str]]:
+    """Inner levels, the NLP that each works on, and whether its functions are compiled, see `compiling`. The baseline comes first."""
+    problem, when = case.make(), "always" if compiler() else "0"
     with compiling(when):
         nlp = case.mesh.transcribe(problem)
     solvers: dict[str, InnerSolver] = {BASELINE: Ipopt(objective="constant"), PROJECTION: Ipopt(), "newton": Newton()}
     solvers |= {DEFAULT: Projection()} | ({"propagate": Propagate()} if case.propagates else {})
-    contenders = [Contender(Row(case.name, name), solver, nlp, when) for name, solver in solvers.items()]
-    if when != "0" and effort.interpreted:
+    ready = {who: (solver, nlp, when) for who, solver in solvers.items()}
+    if when != "0":
         with compiling("0"):
-            contenders.append(Contender(Row(case.name, f"{DEFAULT}, interpreted"), Projection(), case.mesh.transcribe(problem), "0"))
-    return contenders
+            ready[f"{DEFAULT}, interpreted"] = Projection(), case.mesh.transcribe(problem), "0"
+    return ready
 
 
-def _warm_up(case: Case, contenders: Sequence[Contender], batches: Sequence[Batch], seconds: float) -> None:
-    """Programs get built and functions compiled before the clock is looked at, with all the numbers of candidates that will be needed."""
-    candidates, warm = batches[0]
-    for contender in contenders:
-        contender.solve(candidates[:1], None if warm is None else warm[:1], case.tolerance)
-    began = time.perf_counter()
+def inner_rounds(case: InnerCase, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
+    """Each round solves another batch by all inner levels."""
+    ready, rng = contenders(case), np.random.default_rng(0)
+    _, nlp, when = ready[BASELINE]
+    with compiling(when):
+        ranges = objective_ranges(nlp, case.tolerance)
+        batches = [case.batch(nlp, rng) for _ in range(effort.rounds)]
+    # Programs are built before the clock runs, and functions compiled for all the numbers of candidates that Newton's method will have.
+    for one in ready.values():
+        solve(one, batches[0], case.tolerance)
+    began = timeit.default_timer()
     for batch in batches:
-        for contender in {id(contender.nlp): contender for contender in contenders}.values():
-            with compiling(contender.when):
-                Newton().solve(contender.nlp, *batch, tolerance=case.tolerance)
-        if time.perf_counter() - began > seconds:
-            return
+        for _, own, how in {id(own): (solver, own, how) for solver, own, how in ready.values()}.values():
+            solve((Newton(), own, how), batch, case.tolerance)
+        if timeit.default_timer() - began > effort.seconds:
+            break
+
+    def measured(number: int) -> Iterable[Row]:
+        batch = batches[number - 1]
+        exact = Ipopt().solve(nlp, *batch, tolerance=1e-11) if number <= 6 else None  # takes longest, and six rounds show it
+        timed = side_by_side({who: partial(repeated, one, batch, case.tolerance) for who, one in ready.items()}, number)
+        seconds = {who: taken / times / BATCH for who, (taken, (times, _)) in timed.items()}
+        for who, (_, (_, result)) in timed.items():
+            speed = seconds[BASELINE] / seconds[who]
+            yield Row.once(case.name, who, speed=speed, seconds=seconds[who], **quality(result, exact, ranges))
+
+    return measured
 
 
-def _ranges(nlp: NLP, tolerance: float) -> np.ndarray:
-    """Ranges (m,) of the objectives over feasible points near random candidates."""
+def solve(one: tuple[InnerSolver, NLP, str], batch: Batch, tolerance: float) -> InnerResult:
+    """The results of a batch."""
+    solver, nlp, when = one
+    with compiling(when):
+        return solver.solve(nlp, *batch, tolerance=tolerance)
+
+
+def repeated(one: tuple[InnerSolver, NLP, str], batch: Batch, tolerance: float) -> tuple[int, InnerResult]:
+    """How often a batch was solved within 5 ms, so that the clock matters less, and its results."""
+    began, times = timeit.default_timer(), 0
+    while times == 0 or timeit.default_timer() - began < 5e-3:
+        result, times = solve(one, batch, tolerance), times + 1
+    return times, result
+
+
+def objective_ranges(nlp: NLP, tolerance: float) -> np.ndarray:
+    """Ranges (m,) of the objectives over feasible points near twenty random candidates."""
     span = nlp.span[nlp.free]
-    candidates = nlp.lower[nlp.free] + np.random.default_rng(1).random((RANGES, len(span))) * span
-    found = Projection().solve(nlp, candidates, tolerance=tolerance)
-    F = found.F[found.status == CONVERGED]
+    candidates = nlp.lower[nlp.free] + np.random.default_rng(1).random((20, len(span))) * span
+    result = Projection().solve(nlp, candidates, tolerance=tolerance)
+    F = result.F[result.status == CONVERGED]
     ranges = np.ptp(F, axis=0) if len(F) else np.zeros(len(nlp.problem.goals))
     return np.where(ranges > 0, ranges, 1.0)
 
 
-def _quality(result: InnerResult, exact: InnerResult | None, ranges: np.ndarray) -> dict[str, float]:
+def quality(result: InnerResult, exact: InnerResult | None, ranges: np.ndarray) -> dict[str, float]:
+    """How often an inner level converges, how far it moves candidates, and how far its objectives are from those of the nearest points."""
     good = result.status == CONVERGED
     values = {
         "converged": float(good.mean()),
@@ -155,66 +184,126 @@ def _quality(result: InnerResult, exact: InnerResult | None, ranges: np.ndarray)
     return values
 
 
-def compiling(when: str) -> AbstractContextManager[Any]:
-    """A context in which Functions that are made are compiled at once ("always"), or never ("0")."""
-    return patch.dict(os.environ, MACS_COMPILE=when)
+def overall(row: Row) -> str:
+    """The ratio of the sums of all times: a batch that takes long, for one candidate of ten, weighs more in it than in the median."""
+    seconds = np.array(row.values["seconds"])
+    return short(float((np.array(row.values["speed"]) * seconds).sum() / seconds.sum()))
 
 
-def report(rows: Sequence[Row]) -> str:
-    """The measured values, their meaning, and the targets."""
+def inner_targets(rows: Sequence[Row]) -> list[Target]:
+    """What is asked of the default inner level: times and distances by the median of the rounds, convergence over all candidates."""
+    asked = {case.name: case.asked for case in CASES}
+    by_name = {(row.case, row.who): row for row in rows}
+    made = []
+    for row in [row for row in rows if row.who == DEFAULT]:
+        limits, name = asked.get(row.case, {}), f"{row.case}, {DEFAULT}"
+        if "speed" in limits:
+            value, least = f"{row.spread('speed')}, in all {overall(row)}", limits["speed"]
+            made.append(Target(name, f"at least {least:g} times as fast", value, row.of("speed") >= least))
+        if "moved" in limits:
+            value = f"{row.short('moved')} (nearest: {by_name[row.case, PROJECTION].short('moved')})"
+            made.append(Target(name, f"moved by at most {limits['moved']:g}", value, row.of("moved") <= limits["moved"]))
+        ours, theirs = row.of("converged", np.mean), by_name[row.case, BASELINE].of("converged", np.mean)
+        made.append(Target(name, "converged at least as often", f"{100 * ours:.0f} % to {100 * theirs:.0f} %", ours >= theirs))
+    return made
+
+
+def compiled(rows: Sequence[Row]) -> list[str]:
+    """Whether functions are compiled, and by what."""
     used = compiler()
-    compiled = f"Functions are compiled ({Path(used).name}) unless a row states otherwise." if used else "No function is compiled."
-    lines = [
-        "INNER LEVELS: candidates a second, as multiples of those of IPOPT's defaults with a constant objective, the paper's inner level.",
-        f"Batches of {BATCH}, the same for all, in turn; median and quartiles over rounds, least and greatest of few; in all: the ratio",
-        f"of the sums of all times. {compiled}",
-        "moved: mean distance from the candidate, in spans. fallbacks: left to IPOPT. off: by how much objectives differ from the nearest",
-        f"point's (projection by IPOPT at {EXACT_TOLERANCE:g}), in ranges of feasible points; large where another point is about as near.",
-        "",
-        table(rows, COLUMNS),
-        "",
-        *verdicts(targets(rows)),
-    ]
-    return "\n".join(lines)
+    return [f"Functions are compiled ({Path(used).name}) unless a row states otherwise." if used else "No function is compiled.", ""]
 
 
-COLUMNS: tuple[Column, ...] = (
-    ("times as", "fast", lambda row: row.spread("speed") if row.who != BASELINE else "1"),
-    ("in", "all", lambda row: short(_overall(row)) if row.who != BASELINE else "1"),
-    ("ms a", "candidate", lambda row: short(1e3 * row.of("seconds"))),
-    ("con-", "verged", lambda row: f"{100 * row.of('converged', np.mean):.0f} %"),
-    ("moved", "", lambda row: short(row.of("moved", np.mean))),
-    ("itera-", "tions", lambda row: short(row.of("iterations", np.mean))),
-    ("fall-", "backs", lambda row: f"{100 * row.of('fallbacks', np.mean):.0f} %" if row.who.startswith(DEFAULT) else ""),
-    ("off,", "median", lambda row: short(row.of("off, median"))),
-    ("off,", "largest", lambda row: short(row.of("off, largest", np.max))),
-    ("", "rounds", lambda row: str(len(row.values["speed"]))),
+INNER = Bench(
+    title="inner levels",
+    about="INNER LEVELS: candidates a second, as multiples of those of IPOPT's defaults with a constant objective, the paper's inner "
+    "level. Batches of 10, the same for all, in turn; median and quartiles over rounds, least and greatest of few; in all: the "
+    "ratio of the sums of all times. moved: mean distance from the candidate, in spans. fallbacks: left to IPOPT. off: by how much "
+    "objectives differ from the nearest point's (projection by IPOPT at 1e-11), in ranges of feasible points; large where another "
+    "point is about as near.",
+    full=Effort(CASES, rounds=40, seconds=12.0),
+    quick=Effort(SHORT, rounds=6, seconds=1.0),
+    prepare=inner_rounds,
+    columns=(
+        ("times as", "fast", lambda row: row.spread("speed") if row.who != BASELINE else "1"),
+        ("in", "all", lambda row: overall(row) if row.who != BASELINE else "1"),
+        ("ms a", "candidate", lambda row: short(1e3 * row.of("seconds"))),
+        column("con-", "verged", "converged", np.mean, ".0%"),
+        column("moved", "", "moved", np.mean),
+        column("itera-", "tions", "iterations", np.mean),
+        ("fall-", "backs", lambda row: f"{row.of('fallbacks', np.mean):.0%}" if row.who.startswith(DEFAULT) else ""),
+        column("off,", "median", "off, median"),
+        column("off,", "largest", "off, largest", np.max),
+        rounds_of("speed"),
+    ),
+    targets=inner_targets,
+    notes=compiled,
 )
 
 
-def _overall(row: Row) -> float:
-    """The ratio of the sums of all times: a batch that takes long, for one candidate of ten, weighs more in it than in the median."""
-    seconds = np.array(row.values["seconds"])
-    return float((np.array(row.values["speed"]) * seconds).sum() / seconds.sum())
+SINGLY, TOGETHER, COMPILED = "one by one", "in one call", "in one call, compiled"
+ASKED_OF_ONE_CALL = 4.0
+"""Times as fast as one by one, without a compiler. Candidates a second would depend on the machine."""
 
 
-def targets(rows: Sequence[Row]) -> list[Target]:
-    """What is asked of the default inner level: times and distances by the median of the rounds, convergence over all candidates."""
-    asked = {case.name: case.asked for case in INNER}
-    found = {(row.case, row.who): row for row in rows}
-    made = []
-    for (case, who), row in found.items():
-        if who != DEFAULT:
-            continue
-        limits, name = asked.get(case, {}), f"{case}, {DEFAULT}"
-        if "speed" in limits:
-            value, least = f"{row.spread('speed')}, in all {short(_overall(row))}", limits["speed"]
-            made.append(Target(name, f"at least {least:g} times as fast", value, row.of("speed") >= least))
-        if "moved" in limits:
-            moved, nearest = (found[case, other].of("moved") for other in (DEFAULT, PROJECTION))
-            value = f"{short(moved)} (nearest: {short(nearest)})"
-            made.append(Target(name, f"moved by at most {limits['moved']:g}", value, moved <= limits["moved"]))
-        ours, theirs = (found[case, other].of("converged", np.mean) for other in (DEFAULT, BASELINE))
-        value = f"{100 * ours:.0f} % to {100 * theirs:.0f} %"
-        made.append(Target(name, "converged at least as often", value, ours >= theirs))
-    return made
+@dataclass(frozen=True)
+class Population:
+    """So many candidates of the first re-entry case by a transcription."""
+
+    method: str = "shooting:200"
+    candidates: int = 120
+
+    @property
+    def name(self) -> str:
+        """Of its rows."""
+        return f"reentry_case1, {self.method}, {self.candidates} candidates"
+
+
+def population_rounds(case: Population, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
+    """Each round propagates all candidates in each way, five times, of which the quickest counts."""
+    problem, method = load("reentry_case1"), parse(case.method)
+    X = Smooth().draw(problem, method, case.candidates, np.random.default_rng(0))
+
+    def propagator(when: str) -> Callable[[np.ndarray], InnerResult]:
+        with compiling(when):
+            nlp = method.transcribe(problem)
+        return lambda rows: solve((Propagate(), nlp, when), (rows, None), 1e-6)
+
+    plain = propagator("0")
+    ways: dict[str, Callable[[], object]] = {SINGLY: lambda: [plain(x[None]) for x in X], TOGETHER: lambda: plain(X)}
+    if compiler():
+        ways[COMPILED] = partial(propagator("always"), X)
+    for way in ways.values():
+        way()  # its functions are made
+
+    def measured(number: int) -> Iterable[Row]:
+        timed = side_by_side({who: partial(timeit.repeat, way, number=1, repeat=5) for who, way in ways.items()}, number)
+        seconds = {who: min(times) for who, (_, times) in timed.items()}
+        return [
+            Row.once(case.name, who, speed=seconds[SINGLY] / taken, candidates=case.candidates / taken) for who, taken in seconds.items()
+        ]
+
+    return measured
+
+
+def population_targets(rows: Sequence[Row]) -> list[Target]:
+    """One call is so many times as fast as one by one, by the median of the rounds."""
+    speed = next(row for row in rows if row.who == TOGETHER).of("speed")
+    asked = f"at least {ASKED_OF_ONE_CALL:g} times as fast"
+    return [Target("in one call, without a compiler", asked, short(speed), speed >= ASKED_OF_ONE_CALL)]
+
+
+POPULATION = Bench(
+    title="populations",
+    about="POPULATIONS: the candidates of a population search, propagated and scored in one call, against one after the other, in turn; "
+    "median, least and greatest of few rounds. Candidates a second depend on the machine and its load.",
+    full=Effort((Population(),), rounds=5),
+    quick=Effort((Population(),), rounds=2),
+    prepare=population_rounds,
+    columns=(
+        ("times as", "fast", lambda row: "1" if row.who == SINGLY else row.spread("speed")),
+        column("candidates", "a second", "candidates"),
+        rounds_of("speed"),
+    ),
+    targets=population_targets,
+)

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import importlib
 import os
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
+from math import pi
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -22,11 +24,10 @@ from problems import Problem, load
 from problems.cases.standard import delta_iii as launcher
 from transcription import parse
 
-from .measured import Column, Row, Target, short, table, verdicts
-from .rivals import by_rockit
+from .contract import Bench, Column, Effort, Row, Target, column, short, side_by_side
 
 OURS, YAPSS, ROCKIT = "MACS", "YAPSS", "rockit"
-ASKED = 1.5
+ASKED_BESIDE_YAPSS = 1.5
 """Times YAPSS's time, at most."""
 
 
@@ -38,9 +39,9 @@ class Example:
     problem: Callable[[], Problem]  # ours
     # The transcription of ours: so fine that the optimum is that of YAPSS, or the exact one, to six digits or as many as can be had.
     word: str
-    module: str  # module, setup: The example of YAPSS, and its function
+    module: str  # module, setup: the example of YAPSS, and its function
     setup: str = "setup"
-    rockit: Callable[[], float] | None = None  # its solution in rockit: the optimum
+    rockit: Callable[[Any], float] | None = None  # rockit -> the optimum, by its solution there
 
 
 def goddard() -> Problem:
@@ -77,31 +78,96 @@ def delta_iii() -> Problem:
     return problem
 
 
-def _standard(name: str, **data: bool) -> Callable[[], Problem]:
-    return lambda: load(f"standard/{name}", **data)
+# Four of the examples as a user of rockit states them: direct collocation of degree 4, IPOPT as it comes.
+
+
+def ocp_of(rockit: Any, rates: Sequence[tuple[Any, Any]], starts: Sequence[tuple[Any, float]], ocp: Any) -> None:
+    """State rates and initial values."""
+    for state, rate in rates:
+        ocp.set_der(state, rate)
+    for state, value in starts:
+        ocp.subject_to(ocp.at_t0(state) == value)
+
+
+def solved_by(rockit: Any, ocp: Any, objective: Any, guesses: Sequence[tuple[Any, Any]]) -> float:
+    """The optimum of what is to be minimised, on 40 elements."""
+    for symbol, guess in guesses:
+        ocp.set_initial(symbol, guess)
+    ocp.add_objective(objective)
+    ocp.solver("ipopt", {"ipopt.print_level": 0, "print_time": False})
+    ocp.method(rockit.DirectCollocation(N=40))
+    return float(ocp.solve().value(objective))
+
+
+def rockit_goddard(rockit: Any) -> float:
+    """Height of Goddard's rocket, in one phase; mass and height in units near one."""
+    ocp = rockit.Ocp(t0=0, T=rockit.FreeTime(40))
+    h, v, m, thrust = ocp.state(scale=18000), ocp.state(scale=800), ocp.state(scale=3), ocp.control(scale=193.044)
+    drag = 5.49153484923381010e-05 * v**2 * ca.exp(-h / 23800.0)
+    rates = [(h, v), (v, (thrust - drag) / m - 32.174), (m, -thrust / 1580.9425279876559)]
+    ocp_of(rockit, rates, [(h, 0), (v, 0), (m, 3)], ocp)
+    ocp.subject_to(ocp.at_tf(m) == 1)
+    for value, low, high in ((h, 0, 30000), (v, 0, 15000), (m, 1, 3), (thrust, 0, 193.044)):
+        ocp.subject_to(low <= (value <= high))
+    ocp.subject_to((ocp.T <= 100) >= 20)
+    return -solved_by(rockit, ocp, -ocp.at_tf(h), [(h, 400 * ocp.t), (v, 400), (m, 2), (thrust, 90)])
+
+
+def rockit_orbit(rockit: Any) -> float:
+    """Radius of the final orbit."""
+    ocp = rockit.Ocp(t0=0, T=3.32)
+    r, vr, vt = (ocp.state() for _ in range(3))
+    ur, ut = ocp.control(order=1), ocp.control(order=1)
+    force = 0.1405 / (1 - 0.0749 * ocp.t)
+    rates = [(r, vr), (vr, vt**2 / r - 1 / r**2 + force * ur), (vt, -vr * vt / r + force * ut)]
+    ocp_of(rockit, rates, [(r, 1), (vr, 0), (vt, 1)], ocp)
+    ocp.subject_to(ocp.at_tf(vr) == 0)
+    ocp.subject_to(ocp.at_tf(vt - ca.sqrt(1 / r)) == 0)
+    ocp.subject_to(ur**2 + ut**2 <= 1)
+    guesses = [(r, 1 + 0.15 * ocp.t), (vt, 1 - 0.15 * ocp.t), (ur, 0.3 * ocp.t), (ut, 1 - 0.3 * ocp.t)]
+    return -solved_by(rockit, ocp, -ocp.at_tf(r), guesses)
+
+
+def rockit_circle(rockit: Any) -> float:
+    """The largest area within a closed curve of length 1, which may begin anywhere."""
+    ocp = rockit.Ocp(t0=0, T=1)
+    x, y = ocp.state(), ocp.state()
+    angle = ocp.control(order=1)
+    ux, uy = ca.cos(angle), ca.sin(angle)
+    ocp_of(rockit, [(x, ux), (y, uy)], [(angle, 0)], ocp)
+    for state in (x, y):
+        ocp.subject_to(ocp.at_t0(state) == ocp.at_tf(state))
+        ocp.subject_to(ocp.integral(state) == 0)
+    return -solved_by(rockit, ocp, -ocp.integral((y * ux - x * uy) / 2), [(angle, -2 * pi * ocp.t)])
+
+
+def rockit_nose(rockit: Any) -> float:
+    """Least drag of Newton's nose, with a flat front."""
+    ocp = rockit.Ocp(t0=rockit.FreeTime(0.3), T=rockit.FreeTime(0.7))
+    y, slope = ocp.state(), ocp.control(order=1)
+    ocp_of(rockit, [(y, -slope)], [(y, 1)], ocp)
+    ocp.subject_to(ocp.at_tf(y) == 0)
+    ocp.subject_to(ocp.t0 + ocp.T == 1)
+    ocp.subject_to((ocp.t0 <= 0.99) >= 0.01)
+    ocp.subject_to((slope <= 20) >= 0)
+    return solved_by(rockit, ocp, ocp.integral(8 * ocp.t / (1 + slope**2)) + 4 * ocp.t0**2, [(slope, 1)])
+
+
+def standard(name: str, **data: bool) -> Callable[[], Problem]:
+    """A published problem."""
+    return partial(load, f"standard/{name}", **data)
 
 
 EXAMPLES = (
     Example("Delta III", delta_iii, "dfet:5x4", "delta_iii_ascent"),
-    Example("minimum time to climb", _standard("climb"), "dfet:15x4", "minimum_time_to_climb"),
-    Example("Goddard, one phase", goddard, "dfet:20x4", "goddard_problem_1_phase", rockit=by_rockit.goddard),
-    Example("Goddard, three phases", _standard("sounding_rocket", constrained=True), "dfet:6x4", "goddard_problem_3_phase"),
-    Example("orbit raising", _standard("orbit_raising"), "dfet:15x4", "orbit_raising", rockit=by_rockit.orbit_raising),
-    Example("dynamic soaring", _standard("dynamic_soaring"), "dfet:20x4", "dynamic_soaring"),
-    Example("isoperimetric", _standard("isoperimetric"), "dfet:10x4", "isoperimetric", rockit=by_rockit.isoperimetric),
-    Example("Newton's nose", _standard("newton_nose"), "dfet:10x4", "newton", "setup2", rockit=by_rockit.newton),
+    Example("minimum time to climb", standard("climb"), "dfet:15x4", "minimum_time_to_climb"),
+    Example("Goddard, one phase", goddard, "dfet:20x4", "goddard_problem_1_phase", rockit=rockit_goddard),
+    Example("Goddard, three phases", standard("sounding_rocket", constrained=True), "dfet:6x4", "goddard_problem_3_phase"),
+    Example("orbit raising", standard("orbit_raising"), "dfet:15x4", "orbit_raising", rockit=rockit_orbit),
+    Example("dynamic soaring", standard("dynamic_soaring"), "dfet:20x4", "dynamic_soaring"),
+    Example("isoperimetric", standard("isoperimetric"), "dfet:10x4", "isoperimetric", rockit=rockit_circle),
+    Example("Newton's nose", standard("newton_nose"), "dfet:10x4", "newton", "setup2", rockit=rockit_nose),
 )
-
-
-@dataclass(frozen=True)
-class Effort:
-    """Size of a measurement: rounds, and which examples."""
-
-    rounds: int = 5
-    examples: tuple[Example, ...] = EXAMPLES
-
-
-QUICK = Effort(rounds=1, examples=EXAMPLES[4:5] + EXAMPLES[6:])
 
 
 def missing() -> list[str]:
@@ -109,51 +175,39 @@ def missing() -> list[str]:
     return [name for name in ("yapss", "rockit") if find_spec(name) is None]
 
 
-def bench_peers(rows: list[Row], effort: Effort) -> None:
-    """Measure; `rows` are filled as values become known, also if `Stopped` ends it."""
-    with Steps("examples", effort.rounds * len(effort.examples)) as steps:
-        for example in effort.examples:
-            contenders = list(_contenders(example))
-            own = {who: Row(example.name, who) for who, _ in contenders}
-            rows += own.values()
-            for number in range(effort.rounds):
-                steps.begin(f"{example.name}, round {number + 1}")
-                for who, solve in contenders:
-                    began = time.perf_counter()
-                    optimum = solve()
-                    seconds = time.perf_counter() - began
-                    own[who].add(optimum=optimum, seconds=seconds)
-            for row in own.values():
-                row.add(ratio=row.of("seconds") / own[YAPSS].of("seconds") if YAPSS in own else np.nan)
-
-
-def _contenders(example: Example) -> Iterator[tuple[str, Callable[[], float]]]:
-    """Names of programs, and what states and solves the example in each."""
+def rounds(example: Example, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
+    """Each round states and solves the example in each program."""
+    # Imported before the clock runs: the modules of YAPSS hold tables and pictures, too.
+    programs: dict[str, Callable[[], float]] = {OURS: partial(by_macs, example)}
     absent = missing()
-    yield OURS, lambda: _ours(example)
     if "yapss" not in absent:
-        # Imported before the clock starts: it holds tables and pictures, too.
         module = importlib.import_module(f"yapss.examples.{example.module}")
-        yield YAPSS, lambda: _yapss(getattr(module, example.setup))
+        programs[YAPSS] = partial(by_yapss, getattr(module, example.setup))
     if "rockit" not in absent and example.rockit is not None:
-        solve = example.rockit
-        yield ROCKIT, lambda: _silently(solve)
+        programs[ROCKIT] = partial(silently, partial(example.rockit, importlib.import_module("rockit")))
+
+    def measured(number: int) -> Iterable[Row]:
+        timed = side_by_side(programs, number)
+        return [Row.once(example.name, who, seconds=seconds, optimum=optimum) for who, (seconds, optimum) in timed.items()]
+
+    return measured
 
 
-def _ours(example: Example) -> float:
-    """The optimum as this program finds it; not a number where it does not converge."""
-    # Without a simulation, which the others do not make either.
+def by_macs(example: Example) -> float:
+    """The optimum as this program finds it, without a simulation, which the others do not make either; NaN where it does not converge."""
     point = optimize(example.problem(), parse(example.word), verify=None)
     return next(iter(point.objectives.values())) if point.status == "converged" else np.nan
 
 
-def _yapss(setup: Callable) -> float:
+def by_yapss(setup: Callable[[], Any]) -> float:
+    """The optimum of an example of YAPSS."""
     problem = setup()
     problem.ipopt_options.print_level = 0
-    return _silently(lambda: float(problem.solve().objective))
+    return silently(lambda: float(problem.solve().objective))
 
 
-def _silently(work: Callable[[], float]) -> float:
+def silently(work: Callable[[], float]) -> float:
+    """The result of work that prints nothing."""
     with silence():
         return work()
 
@@ -171,34 +225,46 @@ def silence() -> Iterator[None]:
         os.close(nothing)
 
 
-COLUMNS: tuple[Column, ...] = (
-    ("seconds", "statement to solution", lambda row: row.spread("seconds")),
-    ("times", "YAPSS's", lambda row: short(row.of("ratio"))),
-    ("optimum", "", lambda row: f"{row.of('optimum'):.9g}"),
-)
-
-
-def report(rows: Sequence[Row]) -> str:
-    """The table, the targets, and which peers are missing."""
-    lines = [
-        "PEERS: one optimum from its statement to its solution, in each program in turn; median and quartiles of the rounds.",
-        "",
-        table(rows, COLUMNS),
-        "",
-        *verdicts(targets(rows)),
-    ]
-    absent = missing()
-    if absent:
-        lines.append(f"not installed: {', '.join(absent)}; for a comparison: pip install 'macs-trajectories[peers]'")
-    return "\n".join(lines)
+def ratio(rows: Sequence[Row], row: Row) -> float:
+    """Median time as a multiple of YAPSS's on the same example; NaN without YAPSS."""
+    return next((row.of("seconds") / other.of("seconds") for other in rows if (other.case, other.who) == (row.case, YAPSS)), np.nan)
 
 
 def targets(rows: Sequence[Row]) -> list[Target]:
-    """Ours takes little more time than YAPSS, where that is installed, and converges."""
-    asked, made = f"at most {ASKED:g} times YAPSS's time", []
+    """Ours takes little more time than YAPSS, where that is installed, and converges in every round."""
+    made = []
     for row in rows:
-        if row.who == OURS and row.values.get("ratio"):
+        times = ratio(rows, row)
+        if row.who == OURS and np.isfinite(times):
             converged = len(row.values["optimum"]) == len(row.values["seconds"])
-            value = f"{short(row.of('ratio'))} times" + ("" if converged else ", not converged")
-            made.append(Target(row.case, asked, value, converged and row.of("ratio") <= ASKED))
+            value = f"{short(times)} times" + ("" if converged else ", not converged")
+            asked = f"at most {ASKED_BESIDE_YAPSS:g} times YAPSS's time"
+            made.append(Target(row.case, asked, value, converged and times <= ASKED_BESIDE_YAPSS))
     return made
+
+
+def absent_peers(rows: Sequence[Row]) -> list[str]:
+    """Which peers are missing."""
+    absent = missing()
+    return [f"not installed: {', '.join(absent)}; for a comparison: pip install 'macs-trajectories[peers]'"] if absent else []
+
+
+def columns(rows: Sequence[Row]) -> tuple[Column, ...]:
+    """The columns of the table, of which one has ratios to another row."""
+    return (
+        ("seconds", "statement to solution", lambda row: row.spread("seconds")),
+        ("times", "YAPSS's", lambda row: short(ratio(rows, row))),
+        column("optimum", "", "optimum", form=".9g"),
+    )
+
+
+PEERS = Bench(
+    title="examples",
+    about="PEERS: one optimum from its statement to its solution, in each program in turn; median and quartiles of the rounds.",
+    full=Effort(EXAMPLES, rounds=5),
+    quick=Effort(EXAMPLES[4:5] + EXAMPLES[6:]),
+    prepare=rounds,
+    columns=columns,
+    targets=targets,
+    notes=absent_peers,
+)

@@ -156,38 +156,40 @@ def verify(arguments: Namespace) -> int:
 
 def bench(arguments: Namespace) -> int:
     """Ratios against the alternatives."""
-    from .. import bench as benchmarks
+    from ..bench import BENCHES, header_of, solvers_of
+    from ..bench import bench as measure
 
-    kinds = [choose(arguments.what, benchmarks.KINDS, "benchmark")] if arguments.what else benchmarks.KINDS
+    kind, quick = arguments.what, arguments.quick
+    kinds = [choose(kind, sorted(BENCHES), "benchmark")] if kind else sorted(BENCHES)
+    seeded, kept = ([name for name in kinds if getattr(BENCHES[name], has)] for has in ("seeded", "kept"))
     if arguments.csv:
         check_target(arguments.csv)
-    if arguments.seeds:
-        if arguments.quick:
-            raise WrongCall("--seeds: --quick has one seed")
-        if arguments.what and kinds[0] not in benchmarks.SEEDED:
-            raise WrongCall(f"--seeds: '{kinds[0]}' has none; those with seeds are {', '.join(sorted(benchmarks.SEEDED))}")
+    if arguments.seeds and (quick or not seeded):
+        those = ", ".join(name for name in sorted(BENCHES) if BENCHES[name].seeded)
+        raise WrongCall("--seeds: --quick has one seed" if quick else f"--seeds: '{kind}' has none; those with seeds are {those}")
     for option, given in (("jobs", arguments.jobs > 1), ("keep", arguments.keep), ("solvers", arguments.solvers)):
-        if given and (arguments.quick or (arguments.what and kinds[0] not in benchmarks.STUDIES)):
-            raise WrongCall(f"--{option}: is for searches on plain functions ({', '.join(benchmarks.STUDIES)}), without --quick")
+        if given and (quick or not kept):
+            those = ", ".join(name for name in BENCHES if BENCHES[name].kept)
+            raise WrongCall(f"--{option}: is for searches on plain functions ({those}), without --quick")
     chosen = tuple(dict.fromkeys(arguments.solvers or ()))
     if chosen:
-        if not arguments.what:
+        if not kind:
             raise WrongCall("--solvers: of which one? Sets of functions have different ones")
-        known = benchmarks.solvers_of(kinds[0])
+        known = solvers_of(kind)
         for one in chosen:
             choose(one, known, "solver")
         if known[0] not in chosen:
             raise WrongCall(f"--solvers: {known[0]} must be among them")
-    effort = benchmarks.Effort(arguments.quick, arguments.seeds, arguments.jobs, arguments.keep, chosen)
+    settings = {"quick": quick, "seeds": arguments.seeds, "jobs": arguments.jobs, "keep": arguments.keep, "solvers": chosen}
     if arguments.page:
-        if not arguments.what:
+        if not kind:
             raise WrongCall("--page: of which one? a page is of a single benchmark")
         check_target(arguments.page)
         with wrong_call_on_value_error():
-            benchmarks.header_of(kinds[0], effort, arguments.page)
+            header_of(kind, arguments.page, **settings)
     # A folder that contains something else, or that another process has locked.
     with wrong_call_on_value_error() if arguments.keep else nullcontext():
-        return DONE if benchmarks.bench(kinds, effort, arguments.csv, arguments.page) else FAILED
+        return DONE if measure(kinds, csv=arguments.csv, page=arguments.page, **settings) else FAILED
 
 
 # Arguments

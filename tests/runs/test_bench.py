@@ -1,37 +1,42 @@
-"""Benchmarks: what they print and save; never how fast anything is."""
+"""Benchmarks: what they measure, print, save and ask; never how fast anything is."""
 
 from __future__ import annotations
 
 import csv
-import json
 import os
 import signal
-import subprocess
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
+from math import pi
 
 import numpy as np
 import pytest
 
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
-from problems import load
-from problems.cases import goddard
-from runs.bench import Effort, command, density, fronts, inner, methods, passages, population, prefer, search, standard, study
-from runs.bench.cases import BATCH, INNER
-from runs.bench.fronts.contest import as_good
-from runs.bench.measured import Row, short
-from runs.bench.scale.series import SERIES
+from problems.cases.standard import published
+from runs.bench import BENCHES, density, growth, header_of, inner, passages, peers, prefer, searches, study
+from runs.bench import published as optima
+from runs.bench.contract import Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
 from runs.cli import main
 from transcription import DFET
 
-TINY = inner.Effort(least=1, rounds=1, seconds=0.1, checked=1)
-COARSE = {"goddard, cold": DFET(2, 3), "goddard, warm": DFET(2, 3), "orbit_rise, cold, 1e-9": DFET(4, 1), "needle, cold": DFET(8, 3)}
-SMALL = tuple(replace(case, mesh=COARSE[case.name]) for case in INNER if case.name in COARSE)
-UNASKED = tuple(replace(case, asked={}) for case in SMALL)
-"""Of which no speed is asked: a test says nothing about it."""
+AROUND = (0.5, 1.0, 3.0)
+"""Of which the best, the worst and the mean would say something else than the median, 1."""
+
+
+def times(limit: float) -> list[float]:
+    """Values with this median."""
+    return [limit * one for one in AROUND]
+
+
+def measured(kind: str, *cases, **settings) -> list[Row]:
+    """The rows of a benchmark with these cases; its report has lines that fit on a screen."""
+    rows: list[Row] = []
+    BENCHES[kind].measure(rows, Effort(cases, **settings))
+    assert all(len(line) <= 180 for line in BENCHES[kind].report(rows).splitlines())
+    return rows
 
 
 @pytest.fixture(autouse=True)
@@ -39,300 +44,97 @@ def interpreted(monkeypatch):
     monkeypatch.setenv("MACS_COMPILE", "0")
 
 
-def coarse(name):
-    problem = load(name)
-    problem.default_transcription = "dfet:2x2"
-    return problem
+# The contract
 
 
-SOLVED = ("ours", "simulated", "violation", "seconds", "starts", "iterations", "verified", "memory")
-"""What is measured of a published problem."""
+def a_bench(**changes) -> Bench:
+    """A benchmark of numbers, whose case is the value of its first round."""
+
+    def prepare(case, effort, steps):
+        return lambda number: [Row.once(str(case), "ours", value=case * number), Row.once(str(case), "theirs", value=1.0)]
+
+    settings = {"full": Effort((1, 10), rounds=3), "quick": Effort((1,)), "columns": (("value", "", lambda row: row.spread("value")),)}
+    return replace(Bench("numbers", "NUMBERS: so many.", prepare=prepare, **settings), **changes)
 
 
-def optima(*values, verified=1.0):
-    """What the first transcriptions found for a problem."""
-    words = zip(methods.METHODS, values, strict=False)
-    return [{"method": word, "value": value, "verified": verified, "again": 0.0} for word, value in words]
+def asked(least: float):
+    """The target that ours of the first case has at least this median."""
+    return lambda rows: [Target("first", f"at least {least:g}", rows[0].spread("value"), rows[0].of("value") >= least)]
+
+
+def test_cases_are_measured_round_by_round():
+    rows: list[Row] = []
+    a_bench().measure(rows, Effort((1, 10), rounds=3))
+    assert [(row.case, row.who, row.values["value"]) for row in rows[::2]] == [("1", "ours", [1, 2, 3]), ("10", "ours", [10, 20, 30])]
+    rows.clear()
+    a_bench().measure(rows, Effort((1,), rounds=9, seconds=0.0))
+    assert len(rows[0].values["value"]) == 3, "no further round after so many seconds"
+
+
+def test_each_contender_is_the_first_in_turn():
+    order: list[str] = []
+    work = {name: lambda name=name: order.append(name) for name in "abc"}
+    for number in (1, 2, 3):
+        assert list(side_by_side(work, number)) == ["a", "b", "c"]
+    assert "".join(order) == "bcacababc"
+
+
+def test_rows_and_spreads():
+    rows = [Row.once("a", "b", x=1.0, y=np.nan)]
+    assert rows[0].spread("x") == "1.00" and rows[0].spread("y") == rows[0].spread("z") == "-" and np.isnan(rows[0].of("y"))
+    merge(rows, [Row.once("a", "b", x=3.0)])
+    assert rows[0].spread("x") == "2.00 [1.00, 3.00]"
+    merge(rows, [Row("a", "b", {"x": [3.0, 3.0, 100.0]}), Row.once("a", "c", x=1.0)])
+    assert rows[0].spread("x") == "3.00 [3.00, 3.00]" and [row.who for row in rows] == ["b", "c"]
+    assert [short(v) for v in (0.0, 12.345, 1234.5, 0.05, 1e-7, np.nan, np.inf)] == ["0", "12.3", "1234", "0.0500", "1.00e-07", "-", "inf"]
+
+
+def test_verdicts_are_a_table():
+    assert verdicts([]) == []
+    lines = verdicts([Target("one", "at most 1", "0.5", True), Target("another one", "none", "two", False)])
+    assert lines[2:] == ["one          at most 1  0.5       met", "another one  none       two       MISSED"]
+
+
+# The command
 
 
 @pytest.fixture
-def small(monkeypatch):
-    """Benchmarks that take little; those in processes of their own, which other tests measure, find what is given here."""
-    monkeypatch.setattr(search, "load", coarse)
-    monkeypatch.setattr(command.functions.Contest, "quick", lambda self, rows: None)  # tests of its own
-    monkeypatch.setattr(command.study, "QUICK", study.Effort(rounds=1, runs=2, evaluations=20, spin=1000))
-    monkeypatch.setattr(command.standard, "QUICK", ("moon_landing",))
-    monkeypatch.setattr(standard, "apart", lambda *given: {"status": "converged", **dict.fromkeys(SOLVED, 1.0)})
-    monkeypatch.setattr(command.density, "QUICK", (density.Flight("standard/van_der_pol", density.on(8)),))
-    monkeypatch.setattr(command.methods, "QUICK", ("zermelo",))
-    monkeypatch.setattr(methods, "lines_apart", lambda *given: ([json.dumps(one) for one in optima(5.4578653, 5.4578653)], ""))
-    monkeypatch.setattr(command.fronts, "QUICK", fronts.Effort(fronts.QUICK.cases[:1], (1,), (100,)))
-    monkeypatch.setattr(command.population, "QUICK", population.Effort(rounds=1, calls=1, candidates=3, method="shooting:130"))
-    monkeypatch.setattr(command.passages, "QUICK", passages.Effort(rounds=1, coefficients=2, rows=20))
-    monkeypatch.setattr(prefer, "CASES", (replace(prefer.CASES[0], evaluations=100),))
-    monkeypatch.setattr(command.scale.growth.bench_scale, "__defaults__", ((replace(SERIES[0], quick=(4, 8, 12)),),))
-    monkeypatch.setattr(command.scale.growth, "ASKED", 99.0)
-    monkeypatch.setattr(command.generation.bench_generation, "__defaults__", ((command.generation.SERIES[-1],),))
-    monkeypatch.setattr(command.inner, "INNER", UNASKED[:2])
-    monkeypatch.setattr(command.inner, "QUICK", TINY)
-    monkeypatch.setattr(search, "CASES", (search.Search("goddard", 40, 40, 0.0, goddard.reference),))
-    monkeypatch.setattr(search.bench_search, "__defaults__", (search.CASES,))
+def two(monkeypatch):
+    """Two benchmarks in place of all."""
+    for name in list(BENCHES):
+        monkeypatch.delitem(BENCHES, name)
+    monkeypatch.setitem(BENCHES, "first", a_bench(targets=asked(2.0), seeded=True))
+    monkeypatch.setitem(BENCHES, "second", a_bench(targets=asked(2.1)))
 
 
-def test_passages_side_by_side():
-    """All contenders solve the same problem, to what they are asked for."""
-    rows: list[Row] = []
-    passages.bench_passages(rows, passages.Effort(rounds=1, coefficients=3, rows=30))
-    assert [row.who for row in rows] == [*passages.RIVALS, passages.SINGLY, passages.TOGETHER, passages.TABLE]
-    errors = {row.who: row.of("error") for row in rows}
-    assert max(errors[who] for who in (passages.SINGLY, passages.TOGETHER, passages.TABLE)) < 1e-9
-    assert errors["solve_bvp, 1e-8"] < errors["solve_bvp, 1e-6"] < 1e-6
-    assert "at least 200 times as fast" in passages.report(rows)
-
-
-@pytest.mark.slow
-def test_inner_levels_side_by_side():
-    rows: list[Row] = []
-    inner.bench_inner(rows, TINY, SMALL)
-    found = {(row.case, row.who): row for row in rows}
-    assert {case for case, _ in found} == set(COARSE)
-    for (case, who), row in found.items():
-        assert len(row.values["speed"]) == 1 and row.of("speed") > 0
-        if who == "projection":
-            assert row.of("converged") == 1.0
-            assert row.of("fallbacks") == 1.0 if case == "needle, cold" else row.of("fallbacks") <= 0.2
-    assert {who for case, who in found if case.startswith("orbit")} >= {"propagate"} and ("goddard, cold", "propagate") not in found
-    assert found["goddard, warm", "projection"].of("off, largest") < 1e-3 < found["goddard, warm", inner.BASELINE].of("off, largest")
-    text = inner.report(rows)
-    for word in ("No function is compiled", "at least 15 times as fast", "moved by at most 0.07", "fall-", "needle, cold"):
-        assert word in text
-    assert all(len(line) <= 170 for line in text.splitlines())
-
-
-def test_batches_are_what_the_search_sends():
-    for case in SMALL:
-        nlp = case.mesh.transcribe(case.make())
-        candidates, warm = case.batch(nlp, np.random.default_rng(0))
-        again, _ = case.batch(nlp, np.random.default_rng(0))
-        assert candidates.shape == (BATCH, len(nlp.free)) and np.array_equal(candidates, again)
-        assert ((candidates >= nlp.lower[nlp.free]) & (candidates <= nlp.upper[nlp.free])).all()
-        assert (warm is not None) == case.warm
-        if warm is not None:
-            assert (nlp.evaluate(warm)[1] <= case.tolerance).all()
-            assert 0.0 < nlp.distance(nlp.first_guess(candidates), warm).mean() < 0.1 * len(nlp.free) ** 0.5
-
-
-def test_populations_in_one_call_and_one_by_one(monkeypatch):
-    monkeypatch.setenv("MACS_COMPILE", "0")
-    rows: list[Row] = []
-    population.bench_population(rows, population.Effort(rounds=2, calls=1, candidates=4, method="shooting:130"))
-    assert [row.who for row in rows] == [population.SINGLY, population.TOGETHER]
-    assert [row.case for row in rows] == ["reentry_case1, shooting:130, 4 candidates"] * 2
-    assert rows[0].values["speed"] == [1.0, 1.0]
-    one, many = (np.array(row.values["candidates"]) for row in rows)
-    np.testing.assert_allclose(many / one, rows[1].values["speed"])
-    assert "at least 4 times as fast" in population.report(rows)
-
-
-@pytest.mark.slow
-def test_searches_for_the_same_work_and_points(small):
-    case = search.Search("goddard", 10_000, 100, 0.999, goddard.reference)
-    rows: list[Row] = []
-    search.bench_search(rows, (1, 2), True, (case,))
-    ours, theirs = rows
-    assert (ours.who, theirs.who) == ("MACS", "sweeps")
-    for row in rows:
-        assert len(row.values["ratio"]) == 2 and max(row.values["points"]) <= 10
-        assert row.of("igd", np.min) > 0 and row.of("gd", np.min) >= 0
-    assert ours.of("evaluations") == 100 and theirs.of("gradient_solves") > 10
-    assert all(t >= o > 0 for o, t in zip(ours.values["work"], theirs.values["work"], strict=True))
-    assert ours.spread("ratio") in search.report(rows)
-
-
-def test_problems_of_others_have_two_objectives():
-    for case in search.OTHERS:
-        assert len(case.problem().compile().goals) == 2, case.name
-    assert {"rocket", "cart-pole", "bioreactor"} < {case.name for case in search.OTHERS}
-
-
-@pytest.mark.slow
-def test_fronts_to_the_same_quality():
-    rows: list[Row] = []
-    fronts.bench_fronts(rows, fronts.Effort(fronts.QUICK.cases[:1], (1, 2), (60, 1000)))
-    found = {row.who: row for row in rows}
-    assert [*found] == ["until done", "propagate", "projection", "sweep", "sweep, ten starts"]
-    ours, projection = found["until done"], found["projection"]
-    assert ours.values["good"] == [1.0, 1.0] == ours.values["ratio"] and ours.of("volume") > 0.97
-    assert projection.values["evaluations"] == [1000.0, 1000.0] and projection.of("good", np.min) == 1.0, "60 were not enough"
-    np.testing.assert_allclose(np.array(projection.values["seconds"]) / ours.values["seconds"], projection.values["ratio"])
-    text = fronts.report(rows)
-    assert "goddard: " in text and "at most 1.3 times as long" in text and all(len(line) <= 150 for line in text.splitlines())
-
-
-def test_a_front_that_is_as_good():
-    front = np.stack([np.linspace(0, 1, 30), 1 - np.sqrt(np.linspace(0, 1, 30))], axis=1)
-    assert as_good(front, front) and not as_good(front[:-3], front), "an end is missing"
-    assert as_good(np.delete(front, 15, axis=0), front) and not as_good(front + 0.01, front) and not as_good(front[:0], front)
-
-
-@pytest.mark.slow
-def test_a_guided_search_beside_an_even_one():
-    rows: list[Row] = []
-    prefer.bench_prefer(rows, (1, 2), True, (replace(prefer.CASES[0], evaluations=3000),))
-    even, guided = rows
-    assert (even.who, guided.who) == (prefer.EVEN, prefer.GUIDED) and even.case == guided.case == "zdt1"
-    assert even.values["evaluations"] == guided.values["evaluations"] == [3000.0, 3000.0]
-    np.testing.assert_allclose(np.array(guided.values["missing"]) / even.values["missing"], guided.values["ratio"])
-    assert max(guided.values["ratio"]) < prefer.ASKED and guided.of("inside") > 4 * even.of("inside")
-    assert f"{guided.spread('ratio')}  met" in prefer.report(rows)
-    assert all(len(line) <= 150 for line in prefer.report(rows).splitlines())
-
-
-@pytest.mark.slow
-def test_intervals_by_density_beside_equal_ones():
-    rows: list[Row] = []
-    density.bench_density(rows, (replace(density.QUICK[1], words=density.on(10, steps=7)),))
-    equal, dense = rows
-    assert [row.who for row in rows] == [
-        "equal",
-        "density",
-    ] and equal.case == dense.case == "hypersensitive, multiple-shooting:10x7:linear"
-    assert dense.of("defect") < 1e-2 * equal.of("defect") and abs(dense.of("error")) < abs(equal.of("error"))
-    assert equal.of("error") == pytest.approx(equal.of("objective") / 1.330806904943 - 1, rel=1e-9)
-    assert equal.of("defect") == equal.of("defect of run.x") and density.worst(equal) == "run.x"
-    assert "smaller defect by the density: 1 of 1" in density.report(rows)
-    truths = {case.name: case.true() for case in density.CASES}
-    assert truths["goddard, horizontal speed"] == pytest.approx(0.903889755358877) and truths["van_der_pol"] == pytest.approx(2.8672610452)
-    assert truths["goddard, flight time"] == pytest.approx(109.10894511799619) and not np.isnan(list(truths.values())).any()
-    assert all(len(line) <= 150 for line in density.report(rows).splitlines())
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"), [([0, 1, 2, 3], 0), ([0, 3, 1, 3, 0], 3), ([0, 3, 2.9, 3, 0], 1), ([1, 1, 1], 0), ([0, 1, 0, 1, 0, 1], 4)]
-)
-def test_controls_that_turn_round(values, expected):
-    nlp = DFET(len(values), 1, control_order=0).nlp(load("standard/hypersensitive"))
-    vector = np.zeros(len(nlp.variables))
-    places = [i for i, v in enumerate(nlp.variables) if v.name.startswith("run.u")]
-    vector[places] = values
-    assert density.turns(nlp.unpack(vector)["run"]) == expected
-
-
-@pytest.mark.slow
-def test_published_problems_each_in_its_own_process():
-    rows: list[Row] = []
-    standard.bench_standard(rows, standard.Effort(("moon_landing",)))
-    assert [(row.case, row.who) for row in rows] == [("moon_landing", standard.RIGHT)]
-    (landing,) = rows
-    assert landing.of("published") == 1.420312599049 and abs(landing.of("error")) < 5e-4
-    assert landing.of("simulated") == pytest.approx(landing.of("published") * (1 + landing.of("error")), rel=1e-12)
-    assert landing.of("violation") < 1e-6 and landing.of("iterations") >= landing.of("starts") >= 1 and 30 < landing.of("memory") < 1500
-    text = standard.report(rows)
-    assert [one.measured for one in standard.targets(rows)][:2] == ["1 of 1", "0"] and "MISSED" not in text
-    assert all(len(line) <= 150 for line in text.splitlines())
-
-
-@pytest.mark.slow
-def test_what_does_not_end_or_crashes_is_told(capfd):
-    rows: list[Row] = []
-    standard.bench_standard(rows, standard.Effort(("moon_landing",), limit=0.05))
-    with Steps("published problems", 1) as steps:
-        found = standard.apart("no_such_problem", 0, 60.0, steps)
-    rows.append(standard.compared("no_such_problem", standard.published("moon_landing")[0], found))
-    assert [row.who for row in rows] == [standard.LATE, standard.CRASHED]
-    assert "no_such_problem" in capfd.readouterr().err
-    assert [one.met for one in standard.targets(rows)] == [False, True, True]
-
-
-@pytest.mark.slow
-def test_methods_agree_on_published_problems():
-    rows: list[Row] = []
-    methods.bench_methods(rows, methods.Effort(("zermelo",)))
-    (row,) = rows
-    assert row.who == methods.AGREED and [one.met for one in methods.targets(rows)] == [True]
-    for word in methods.METHODS:
-        assert row.of(f"{word} verified") == 1.0 and row.of(word) == pytest.approx(row.of("published"), rel=1e-4)
-    text = methods.report(rows)
-    assert "agree: 1 of 1; ended early: 0" in text
-    assert all(len(line) <= 150 for line in text.splitlines())
-
-
-def test_verified_optima_that_differ_are_told(monkeypatch, capsys):
-    same, other = (1.4203, 1.4204), (1.4203, 1.4203, 1.4303)
-    row = methods.compared("moon_landing", optima(*other), "")
-    assert row.who == methods.DISAGREED and methods.compared("moon_landing", optima(*same), "").who == methods.AGREED
-    assert methods.compared("moon_landing", optima(*other, verified=0.0), methods.LATE).who == f"-, {methods.LATE}"
-    fixed = [*optima(1.4203, 1.4203), {"method": methods.METHODS[-1], "value": 1.4303, "verified": 1.0, "again": 1.0}]
-    assert methods.compared("moon_landing", fixed, "").who == methods.AGREED, "linear controls on nodes are somewhat worse"
-    monkeypatch.setattr(command.methods, "bench_methods", lambda rows, effort: rows.append(row))
-    assert main(["bench", "methods"]) == 1
-    assert capsys.readouterr().out.splitlines()[-2].split() == ["verified,", "but", "different", "none", "moon_landing", "MISSED"]
-
-
-@pytest.mark.parametrize(
-    ("change", "verdict"),
-    [
-        ({}, "right"),
-        ({"simulated": 1.4213}, "WRONG"),
-        ({"simulated": 1.4193}, "WRONG"),
-        ({"verified": 0.0}, "not verified"),
-        ({"simulated": 1.43, "verified": 0.0}, "not verified"),
-        ({"status": "failed"}, "FAILED"),
-    ],
-)
-def test_verdicts(change, verdict):
-    found = {"status": "converged", "ours": 1.4204, "simulated": 1.4204, "violation": 1e-6, "verified": 1.0, "seconds": 1.0} | change
-    assert standard.compared("moon_landing", standard.published("moon_landing")[0], found).who == verdict
-
-
-@pytest.mark.slow
-def test_the_command_prints_and_saves(small, capsys, tmp_path):
+def test_the_command_prints_judges_and_saves(two, capsys, tmp_path):
     path = tmp_path / "all.csv"
-    # A study of two tiny runs takes much longer than these.
-    assert main(["bench", "--quick", "--csv", str(path)]) == 1
+    assert main(["bench", "--csv", str(path)]) == 1 and main(["bench", "first"]) == 0
     said = capsys.readouterr()
-    titles = ("DENSITY MESHES", "INNER LEVELS", "TRANSCRIPTIONS", "PASSAGES", "POPULATIONS", "PREFERENCES", "GROWTH", "SEARCHES")
-    places = [said.out.index(words) for words in (*titles, "PUBLISHED PROBLEMS", "STUDIES", f"values in {path}")]
-    assert places == sorted(places)
-    assert "at least 1.7 times as fast" in said.out and "at most 5 % beyond" in said.out
-    assert "  study: one process" in said.out[said.out.index("MISSED:") :].splitlines()
-    assert "inner levels: " in said.err and "searches: goddard" in said.err
+    assert said.out.count("NUMBERS: so many.") == 3 and "2.00 [1.00, 3.00]" in said.out
+    assert "MISSED:\n  second: first\n" in said.out and "numbers: 10, seed 1, step 4 of 6" not in said.out
     with path.open() as file:
         table = list(csv.DictReader(file))
-    assert {row["benchmark"] for row in table} == {
-        "density",
-        "front",
-        "generation",
-        "inner",
-        "methods",
-        "passages",
-        "peers",
-        "population",
-        "prefer",
-        "scale",
-        "search",
-        "standard",
-        "study",
-    }
-    assert {"speed", "converged", "moved", "ratio", "gd", "igd"} <= {row["quantity"] for row in table}
-    assert all(np.isfinite(float(row["value"])) for row in table)
+    assert {row["benchmark"] for row in table} == {"first", "second"} and len(table) == 24
+    assert table[2] == {"benchmark": "first", "case": "1", "contender": "ours", "quantity": "value", "repetition": "2", "value": "3.0"}
 
 
-@pytest.mark.slow
+def test_seeds_and_the_quick_effort(two, capsys):
+    assert main(["bench", "first", "--seeds", "5"]) == 0 and "3.00 [2.00, 4.00]" in capsys.readouterr().out
+    assert main(["bench", "first", "--quick"]) == 1 and "10 " not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("how", [Stopped("interrupted"), KeyboardInterrupt()])
-def test_ctrl_c_prints_what_there_is(small, capsys, monkeypatch, how):
-    measure = inner._measure
-
-    def interrupted(case, *rest):
-        if case.name == "goddard, warm":
+def test_ctrl_c_prints_what_there_is(two, monkeypatch, capsys, how):
+    def prepare(case, effort, steps):
+        if case == 10:
             raise how
-        measure(case, *rest)
+        return lambda number: [Row.once(str(case), "ours", value=case)]
 
-    monkeypatch.setattr(inner, "_measure", interrupted)
-    assert command.bench(("inner", "search"), Effort(quick=True), None)
+    monkeypatch.setitem(BENCHES, "first", a_bench(prepare=prepare))
+    assert main(["bench"]) == 0
     said = capsys.readouterr()
-    assert "goddard, cold" in said.out and "goddard, warm" not in said.out and "SEARCHES" not in said.out
-    assert "interrupted: these are the values measured until then" in said.err
+    assert said.out.count("NUMBERS") == 1 and "interrupted: these are the values measured until then" in said.err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -349,49 +151,334 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (
-            ["bench", "studies"],
-            [
-                "studies",
-                "study",
-                "constrained, density, front, generation, inner, many, methods, passages, peers, population, prefer, scale",
-            ],
-        ),
-        (["bench", "iner"], ["'iner'", "did you mean inner?", "search"]),
-        (["bench", "inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
+        (["studies"], ["studies", "study", "constrained, density, front, generation, inner, many, methods, passages, peers, population"]),
+        (["iner"], ["'iner'", "did you mean inner?"]),
+        (["inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
+        (["inner", "--seeds", "2"], ["'inner' has none"]),
+        (["zdt", "--quick", "--seeds", "2"], ["--quick has one seed"]),
+        (["inner", "--jobs", "2"], ["--jobs"]),
+        (["uf", "--quick", "--keep", "here"], ["--keep"]),
+        (["inner", "--solvers", "MACS"], ["--solvers"]),
+        (["--solvers", "MACS"], ["--solvers: of which one"]),
+        (["uf", "--solvers", "MACS", "RVEA"], ["unknown solver 'RVEA'"]),
+        (["uf", "--solvers", "NSGA-II"], ["MACS must be among them"]),
     ],
 )
 def test_wrong_calls(capsys, call, words):
-    assert main(call) == 2
+    assert main(["bench", *call]) == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("\n") == 1 and all(word in said.err for word in words), said.err
 
 
-SCRIPT = """
-import sys
-sys.path.insert(0, {here!r})
-import test_bench
-test_bench.inner.INNER, test_bench.inner.QUICK = test_bench.UNASKED[:1], test_bench.TINY
-from runs.cli import main
-sys.exit(main(["bench", "inner", "--quick"]))
-"""
+def test_options_reach_the_searches_and_the_header(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setitem(BENCHES, "zdt", replace(BENCHES["zdt"], whole=lambda rows, effort: asked.append(effort)))
+    page = tmp_path / "zdt.md"
+    call = ["bench", "zdt", "--seeds", "3", "--jobs", "2", "--keep", "here", "--solvers", "NSGA-II", "MACS", "--page", str(page)]
+    assert main(["bench", "zdt"]) == main(call) == 0
+    assert asked == [Effort(rounds=10), Effort(rounds=3, jobs=2, keep="here", solvers=("NSGA-II", "MACS"))]
+    header = header_of("zdt", page, seeds=3, jobs=2, keep="here", solvers=("MACS", "MOEA/D"))
+    assert "--seeds 3 --jobs 2 --solvers MACS MOEA/D --page" in header.command
+
+
+# What is asked
+
+
+def front_rows(ratio: float, good: float) -> list[Row]:
+    others = [Row("goddard", who, {"ratio": times(ratio), "good": [good] * 3}) for who in (searches.PROPAGATE, searches.PROJECTION)]
+    sweeps = [Row("goddard", who, {"ratio": [0.5], "good": [1.0]}) for who in (searches.SWEEP, searches.SWEEPS)]
+    return [Row("goddard", searches.DONE, {"ratio": [1.0], "good": [1.0]}), *others, *sweeps]
+
+
+def inner_rows(speed: float, moved: float, converged: float) -> list[Row]:
+    case, seconds = "goddard, warm", {"seconds": [1.0, 1.0, 1.0]}
+    return [
+        Row(case, inner.BASELINE, {**seconds, "speed": [1.0] * 3, "moved": [0.3], "converged": [0.9, 1.0, 1.0]}),
+        Row(case, inner.PROJECTION, {**seconds, "speed": [2.0] * 3, "moved": [0.05], "converged": [1.0]}),
+        Row(case, inner.DEFAULT, {**seconds, "speed": times(speed), "moved": times(moved), "converged": [converged, 1.0, 1.0]}),
+    ]
+
+
+def study_rows(speed: float, beyond: float) -> list[Row]:
+    one, two = {"speed": [1.0], "beyond": times(beyond)}, {"speed": times(speed), "beyond": [0.5], "work": [1.0], "seconds": [1.0]}
+    return [Row("goddard", study.ONE, one), Row("goddard", study.TWO, two), Row(study.LIMIT, study.TWO, {"speed": [2.0]})]
+
+
+def peer_rows(ratio: float, converged: int) -> list[Row]:
+    ours = Row("isoperimetric", peers.OURS, {"seconds": times(ratio), "optimum": [0.0796] * converged})
+    return [ours, Row("isoperimetric", peers.YAPSS, {"seconds": times(1.0), "optimum": [0.0796]})]
+
+
+def alone(kind: str, case: str, who: str, **values: list[float]) -> list[Row]:
+    return [Row(case, who, values)]
+
+
+def search_rows(ratio: float, evaluations: float = 20_000.0) -> list[Row]:
+    return [Row("landing_site", searches.OURS, {"ratio": times(ratio), "evaluations": [evaluations]})]
+
+
+def verdict_rows(*kinds: str, memory: float = 100.0) -> list[Row]:
+    return [Row("zermelo", who, {"memory": [memory], "published": [1.0]}) for who in kinds]
+
+
+def passage_rows(speed: float, table: float) -> list[Row]:
+    return [Row("passages", who, {"speed": times(value)}) for who, value in ((passages.SINGLY, speed), (passages.TABLE, table))]
+
+
+MET_AND_MISSED = [
+    ("front", front_rows(1 / 1.2, 1.0), 0),
+    ("front", front_rows(1 / 1.4, 1.0), 1),
+    ("front", front_rows(1 / 1.4, 0.0), 0),
+    ("generation", [Row("re-entry, 120 individuals", "nodes", {"exponent": times(1.15)})], 0),
+    ("generation", [Row("re-entry, 120 individuals", "nodes", {"exponent": times(1.16)})], 1),
+    ("inner", inner_rows(15.0, 0.07, 1.0), 0),
+    ("inner", inner_rows(14.9, 0.07, 1.0), 1),
+    ("inner", inner_rows(15.0, 0.071, 1.0), 1),
+    ("inner", inner_rows(15.0, 0.07, 0.8), 1),
+    ("methods", verdict_rows("agree"), 0),
+    ("methods", verdict_rows("DISAGREE"), 1),
+    ("passages", passage_rows(5.0, 200.0), 0),
+    ("passages", passage_rows(4.9, 200.0), 1),
+    ("passages", passage_rows(5.0, 199.0), 1),
+    ("peers", peer_rows(1.5, 3), 0),
+    ("peers", peer_rows(1.51, 3), 1),
+    ("peers", peer_rows(1.0, 2), 1),
+    ("population", [Row("reentry_case1", inner.TOGETHER, {"speed": times(4.0)})], 0),
+    ("population", [Row("reentry_case1", inner.TOGETHER, {"speed": times(3.9)})], 1),
+    ("population", [Row("reentry_case1", inner.TOGETHER, {"speed": []})], 1),
+    ("prefer", [Row("zdt1", prefer.GUIDED, {"ratio": times(0.33)})], 0),
+    ("prefer", [Row("zdt1", prefer.GUIDED, {"ratio": times(0.34)})], 1),
+    ("scale", [Row("set-up", "nodes", {"time": times(1.1), "memory": [1.0]})], 0),
+    ("scale", [Row("set-up", "nodes", {"time": times(1.11), "memory": [1.5]}), Row("other", "nodes", {"unfinished": [1.0]})], 3),
+    ("search", search_rows(1.01), 0),
+    ("search", search_rows(1.009), 1),
+    ("search", search_rows(0.5, evaluations=2000.0), 0),
+    ("standard", verdict_rows(*["right"] * 17, optima.UNVERIFIED), 0),
+    ("standard", verdict_rows(*["right"] * 16, optima.UNVERIFIED, optima.UNVERIFIED), 1),
+    ("standard", verdict_rows(*["right"] * 17, optima.WRONG), 1),
+    ("standard", verdict_rows(*["right"] * 18, memory=1501.0), 1),
+    ("study", study_rows(1.7, 0.05), 0),
+    ("study", study_rows(1.69, 0.05), 1),
+    ("study", study_rows(1.7, 0.051), 1),
+]
+"""Rows, and how many targets they miss."""
+
+
+def test_targets_follow_the_medians():
+    for kind, rows, missed in MET_AND_MISSED:
+        assert sum(not one.met for one in BENCHES[kind].targets(rows)) == missed, (kind, rows)
+    assert set(BENCHES) - {kind for kind, *_ in MET_AND_MISSED} == {"density", "many", "uf", "zdt", "constrained"}
+
+
+# Each benchmark
+
+
+def test_passages_side_by_side():
+    rows = measured("passages", passages.Coefficients(few=3, many=30))
+    errors = {row.who: row.of("error") for row in rows}
+    assert max(errors[who] for who in (passages.SINGLY, passages.TOGETHER, passages.TABLE)) < 1e-9
+    assert errors["solve_bvp, 1e-8"] < errors["solve_bvp, 1e-6"] < 1e-6
+    assert "at least 200 times as fast" in BENCHES["passages"].report(rows)
 
 
 @pytest.mark.slow
-def test_in_a_process():
-    code = SCRIPT.format(here=str(Path(__file__).parent))
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    assert "goddard, cold" in done.stdout and done.stderr.startswith("inner levels: goddard, cold, step 1 of 1")
+def test_inner_levels_side_by_side():
+    meshes = {"goddard, cold": DFET(2, 3), "goddard, warm": DFET(2, 3), "orbit_rise, cold, 1e-9": DFET(4, 1), "needle, cold": DFET(8, 3)}
+    rows = measured("inner", *(replace(case, mesh=meshes[case.name]) for case in inner.CASES if case.name in meshes))
+    by_name = {(row.case, row.who): row for row in rows}
+    assert {case for case, _ in by_name} == set(meshes)
+    for (case, who), row in by_name.items():
+        assert len(row.values["speed"]) == 1 and row.of("speed") > 0
+        if who == "projection":
+            assert row.of("converged") == 1.0
+            assert row.of("fallbacks") == 1.0 if case == "needle, cold" else row.of("fallbacks") <= 0.2
+    assert ("orbit_rise, cold, 1e-9", "propagate") in by_name and ("goddard, cold", "propagate") not in by_name
+    assert by_name["goddard, warm", "projection"].of("off, largest") < 1e-3 < by_name["goddard, warm", inner.BASELINE].of("off, largest")
+    assert "No function is compiled" in BENCHES["inner"].report(rows)
 
 
-def test_spreads_are_short():
-    row = Row("a", "b")
-    row.add(x=1.0, y=np.nan)
-    assert row.spread("x") == "1.00" and row.spread("y") == row.spread("z") == "-" and np.isnan(row.of("y"))
-    row.add(x=3.0)
-    assert row.spread("x") == "2.00 [1.00, 3.00]"
-    for value in (3.0, 3.0, 100.0):
-        row.add(x=value)
-    assert row.spread("x") == "3.00 [3.00, 3.00]"
-    assert [short(v) for v in (0.0, 12.345, 1234.5, 0.05, 1e-7, np.nan, np.inf)] == ["0", "12.3", "1234", "0.0500", "1.00e-07", "-", "inf"]
+def test_batches_are_what_the_search_sends():
+    for case in (replace(case, mesh=DFET(2, 3)) for case in inner.SHORT[:2]):
+        nlp = case.mesh.transcribe(case.make())
+        candidates, warm = case.batch(nlp, np.random.default_rng(0))
+        assert candidates.shape == (inner.BATCH, len(nlp.free))
+        assert ((candidates >= nlp.lower[nlp.free]) & (candidates <= nlp.upper[nlp.free])).all()
+        assert (warm is not None) == case.warm
+        if warm is not None:
+            assert (nlp.evaluate(warm)[1] <= case.tolerance).all()
+            assert 0.0 < nlp.distance(nlp.first_guess(candidates), warm).mean() < 0.1 * len(nlp.free) ** 0.5
+
+
+def test_populations_in_one_call_and_one_by_one():
+    rows = measured("population", inner.Population("shooting:130", 4), rounds=2)
+    assert [row.who for row in rows] == [inner.SINGLY, inner.TOGETHER] and rows[0].values["speed"] == [1.0, 1.0]
+    one, many = (np.array(row.values["candidates"]) for row in rows)
+    np.testing.assert_allclose(many / one, rows[1].values["speed"])
+
+
+@pytest.mark.slow
+def test_searches_for_the_same_work_and_points():
+    ours, theirs = measured("search", replace(searches.GODDARD, word="dfet:2x2"), evaluations=100, rounds=2)
+    for row in (ours, theirs):
+        assert len(row.values["ratio"]) == 2 and max(row.values["points"]) <= 10
+        assert row.of("igd", np.min) > 0 and row.of("gd", np.min) >= 0
+    assert ours.of("evaluations") == 100 and theirs.of("gradient_solves") > 10
+    assert all(t >= o > 0 for o, t in zip(ours.values["work"], theirs.values["work"], strict=True))
+
+
+def test_problems_of_others_have_two_objectives():
+    for case in searches.OTHERS:
+        assert len(case.build().compile().goals) == 2, case.name
+
+
+@pytest.mark.slow
+def test_fronts_to_the_same_quality(monkeypatch):
+    monkeypatch.setattr(searches, "BUDGETS", (60, 1000))
+    rows = {row.who: row for row in measured("front", searches.GODDARD)}
+    assert [*rows] == ["until done", "propagate", "projection", "sweep", "sweep, ten starts"]
+    ours, projection = rows["until done"], rows["projection"]
+    assert ours.values["good"] == [1.0] == ours.values["ratio"] and ours.of("volume") > 0.97
+    assert projection.values["evaluations"] == [1000.0] and projection.of("good") == 1.0, "60 were not enough"
+
+
+def test_a_front_that_is_as_good():
+    front = np.stack([np.linspace(0, 1, 30), 1 - np.sqrt(np.linspace(0, 1, 30))], axis=1)
+    assert searches.as_good(front, front) and not searches.as_good(front[:-3], front), "an end is missing"
+    assert searches.as_good(np.delete(front, 15, axis=0), front)
+    assert not searches.as_good(front + 0.01, front) and not searches.as_good(front[:0], front)
+
+
+@pytest.mark.slow
+def test_a_guided_search_beside_an_even_one():
+    even, guided = measured("prefer", prefer.ZDT1, rounds=2)
+    assert (even.who, guided.who) == (prefer.EVEN, prefer.GUIDED) and even.case == guided.case == "zdt1"
+    assert even.values["evaluations"] == guided.values["evaluations"] == [3000.0, 3000.0]
+    np.testing.assert_allclose(np.array(guided.values["missing"]) / even.values["missing"], guided.values["ratio"])
+    assert max(guided.values["ratio"]) < prefer.ASKED_OF_GUIDED and guided.of("inside") > 4 * even.of("inside")
+
+
+@pytest.mark.slow
+def test_intervals_by_density_beside_equal_ones():
+    rows = measured("density", density.Optimum("standard/hypersensitive", density.word(10, 7)))
+    equal, dense = rows
+    assert equal.case == dense.case == "hypersensitive, multiple-shooting:10x7:linear"
+    assert dense.of("defect") < 1e-2 * equal.of("defect") and abs(dense.of("error")) < abs(equal.of("error"))
+    assert equal.of("error") == pytest.approx(equal.of("objective") / 1.330806904943 - 1, rel=1e-9)
+    assert equal.of("defect") == equal.of("defect of run.x") and density.worst(equal) == "run.x"
+    assert "smaller defect by the density: 1 of 1" in BENCHES["density"].report(rows)
+
+
+@pytest.mark.slow
+def test_published_problems_each_in_its_own_process(capfd):
+    (landing,) = measured("standard", "moon_landing")
+    assert landing.who == optima.RIGHT and landing.of("published") == 1.420312599049 and abs(landing.of("error")) < 5e-4
+    assert landing.of("simulated") == pytest.approx(landing.of("published") * (1 + landing.of("error")), rel=1e-12)
+    assert landing.of("violation") < 1e-6 and landing.of("iterations") >= landing.of("starts") >= 1 and 30 < landing.of("memory") < 1500
+    (late,) = measured("standard", "moon_landing", seconds=0.05)
+    with Steps("published problems", 1) as steps:
+        lines, ended = optima.lines_of("defaults", "no_such_problem", Effort(), steps)
+    assert late.who == optima.LATE and (lines, ended) == ([], optima.CRASHED) and "no_such_problem" in capfd.readouterr().err
+
+
+@pytest.mark.slow
+def test_methods_agree_on_published_problems():
+    (row,) = measured("methods", "zermelo")
+    assert row.who == optima.AGREED
+    for word in optima.WORDS:
+        assert row.of(f"{word} verified") == 1.0 and row.of(word) == pytest.approx(row.of("published"), rel=1e-4)
+    assert "agree: 1 of 1; ended early: 0" in BENCHES["methods"].report([row])
+
+
+def test_verified_optima_that_differ_are_told():
+    def found(*values: float, verified: float = 1.0, words=optima.WORDS):
+        return [{"method": word, "value": v, "verified": verified, "again": 0.0} for word, v in zip(words, values, strict=False)]
+
+    verdict = {
+        "agree": found(1.4203, 1.4204),
+        "DISAGREE": found(1.4203, 1.4203, 1.4303),
+        "-": found(1.4203, 1.4303, verified=0.0),
+    }
+    assert all(optima.agreement("moon_landing", lines, "").who == word for word, lines in verdict.items())
+    fixed = found(1.4203, 1.4203) + found(1.4303, words=optima.WORDS[-1:])
+    assert optima.agreement("moon_landing", fixed, "").who == optima.AGREED, "linear controls on nodes are somewhat worse"
+    assert optima.agreement("moon_landing", [], optima.LATE).who == f"-, {optima.LATE}"
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({}, "right"),
+        ({"simulated": 1.4213}, "WRONG"),
+        ({"simulated": 1.43, "verified": 0.0}, "not verified"),
+        ({"status": "failed"}, "FAILED"),
+    ],
+)
+def test_verdicts_on_published_optima(change, verdict):
+    line = {"status": "converged", "ours": 1.4204, "simulated": 1.4204, "violation": 1e-6, "verified": 1.0, "seconds": 1.0} | change
+    assert optima.compared("moon_landing", published("moon_landing")[0], line).who == verdict
+
+
+def test_peers_that_are_missing_are_named(monkeypatch):
+    monkeypatch.setattr(peers, "find_spec", lambda name: None)
+    circle = next(example for example in peers.EXAMPLES if example.name == "isoperimetric")
+    (ours,) = rows = measured("peers", circle)
+    assert ours.who == peers.OURS and abs(ours.of("optimum") - 1 / (4 * pi)) < 1e-8
+    assert "not installed: yapss, rockit; for a comparison: pip install" in BENCHES["peers"].report(rows)
+    assert all(len(example.problem().objectives) == 1 for example in peers.EXAMPLES)
+
+
+# Growth
+
+TINY = {"elements": (4, 8), "nodes": (4, 8), "intervals": (4, 8), "phases": (1, 2), "masses": (1, 2), "points": (2, 3), "agents": (4, 6)}
+
+
+@pytest.mark.parametrize("one", growth.SERIES, ids=lambda one: one.name)
+def test_every_series_does_its_work(one):
+    for size in TINY[one.unit]:
+        assert one.prepare(size)() is not None
+
+
+@pytest.mark.parametrize("one", growth.GENERATIONS, ids=lambda one: one.name)
+def test_each_series_of_generations_runs(one):
+    one.prepare(one.sizes[0])(2)
+
+
+def test_problems_have_the_size_that_is_asked_for():
+    assert len(growth.ride(3).compile().phases) == 3 and len(growth.ride(3).compile().links) == 2
+    assert len(growth.masses(3).compile().phases[0].states) == 6 and len(growth.limited(4).compile().phases[0].paths) == 4
+
+
+def test_exponents_are_those_of_powers():
+    sizes = np.array([10.0, 20.0, 40.0])
+    assert growth.exponent(sizes, 3.0 * sizes**1.5) == pytest.approx(1.5)
+    one = growth.SERIES[0]
+    row = growth.growth(one, (5, 10, 20, 40), [(5, 9.0, 0.0), (10, 1.0, 20.0), (20, 2.0, 40.0), (40, 4.0, 80.0)])
+    assert row.of("time") == pytest.approx(1.0) and row.of("memory") == pytest.approx(1.0) and row.of("size") == 40
+    first, again = [(10, 2.0, 1.0), (20, 4.0, 2.0), (40, 4.0, 4.0)], [(10, 1.0, 80.0), (20, 2.0, 80.0), (40, 9.0, 80.0)]
+    row = growth.growth(one, (10, 20, 40), [*first, *again])
+    assert row.of("time") == pytest.approx(1.0), "of repetitions the quickest counts"
+    assert "memory" not in row.values and row.of("MB at 40") == 4.0, "the first peak counts, and a few MB say nothing"
+    assert growth.growth(one, (10, 20, 40), first[:2]).values["unfinished"] == [1.0]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="processes are forked")
+def test_growth_in_a_process_of_its_own():
+    one = next(one for one in growth.SERIES if one.name == "set-up, single shooting")
+    (row,) = measured("scale", replace(one, sizes=(4, 8, 12)))
+    assert np.isfinite(row.of("time")) and row.of("size") == 12 and len(row.values["seconds at 8"]) == 1
+
+
+def test_generations_grow_as_their_work_does(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(growth.time, "process_time", lambda: clock[0])
+
+    def prepare(size: int):
+        def run(generations: int) -> None:
+            clock[0] += 1.0 + 5e-6 * size * size * generations
+
+        return run
+
+    (row,) = measured("generation", growth.Series("quadratic", "things", prepare, (20, 40, 80), "Np^2", 2))
+    assert row.of("exponent") == pytest.approx(2.0) and row.of("seconds") == pytest.approx(5e-6 * 6400)
+    assert "section IV-D" in BENCHES["generation"].report([row])

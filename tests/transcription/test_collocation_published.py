@@ -7,7 +7,7 @@ import pytest
 from macs import Front, optimize
 from problems import load
 from problems.cases.standard import published
-from runs.bench.methods import METHODS
+from runs.bench.published import WORDS
 from transcription import Collocation, parse
 
 QUICK = ("breakwell", "linear_tangent", "van_der_pol")
@@ -19,7 +19,7 @@ QUICK = ("breakwell", "linear_tangent", "van_der_pol")
 def test_all_transcriptions_have_the_same_optimum(name):
     """Each from the problem's own guess, on the mesh it begins on in `macs bench methods`; refined, they agree to 1e-3 or better."""
     problem, record = load(f"standard/{name}"), published(name)[0]
-    for word in METHODS:
+    for word in WORDS:
         method = parse(word)
         point = optimize(problem, method, verify=None, starts=1)
         assert point.status == "converged"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from problems import load
-from runs.bench.scale.chains import masses, ride
+from runs.bench.growth import masses, ride
 from transcription import parse
 from transcription.nlp.derivatives import gradients, hessian
 from transcription.numerics.batched import work

@@ -10,10 +10,10 @@ import pytest
 from plain import dtlz, uf
 
 from macs.pareto.dominance import nondominated
-from runs.bench import Effort, command, header_of
-from runs.bench.functions import NAMES, Contest, cases, contest, judged, searches
-from runs.bench.functions.uf import UF
-from runs.bench.measured import Row
+from runs.bench import BENCHES, contest, solvers_of
+from runs.bench import functions as plain
+from runs.bench.contract import Effort, Row
+from runs.bench.functions import UF
 from runs.cli import main
 
 
@@ -82,7 +82,7 @@ def test_another_statement_has_the_same_values(kind):
 @pytest.mark.parametrize(("kind", "m"), [(1, 5), (2, 5), (3, 5), (4, 5), (7, 3), (2, 8)])
 def test_functions_of_pymoo_are_those_of_the_paper(kind, m):
     function, bounds, _ = dtlz(kind, m)
-    case = cases.dtlz(kind, m)
+    case = plain.dtlz(kind, m)
     (problem,) = case.problem()
     X = np.random.default_rng(2).random((20, len(bounds)))
     np.testing.assert_allclose(problem.evaluate(X, return_values_of=["F"]), function(X), rtol=1e-9)
@@ -98,7 +98,7 @@ def test_functions_of_pymoo_are_those_of_the_paper(kind, m):
 
 def test_fronts_of_zdt_are_dense():
     for kind in (1, 2, 3, 4, 6):
-        front = cases.zdt(kind).front()
+        front = plain.zdt(kind).front()
         assert len(front) == 1000
 
 
@@ -112,13 +112,13 @@ def rows_of(case: str, key: str, evaluations: float, **found: list[float]) -> li
 
 def against_all(name: str, case: str, key: str, evaluations: float, ours: list[float], theirs: list[float]) -> list[Row]:
     """The rows of a case with all rivals of its set, which are all alike."""
-    return rows_of(case, key, evaluations, **{who: ours if who == "MACS" else theirs for who in cases.solvers_of(name)})
+    return rows_of(case, key, evaluations, **{who: ours if who == "MACS" else theirs for who in solvers_of(name)})
 
 
 def many_rows(distance: float, volume: float, good: int) -> list[Row]:
     """Of all functions; ours is behind by more than 2 % on all of five objectives but so many."""
     rows: list[Row] = []
-    for i, one in enumerate(cases.the_set("many").functions):
+    for i, one in enumerate(plain.FUNCTIONS["many"]()):
         own = volume if one.name.startswith("DTLZ2") else 0.99 if i < good else 0.9
         found = against_all("many", one.name, "volume", 15_000, [0.0, own, 9.0], [0.5])
         for row in found:
@@ -133,12 +133,12 @@ def many_rows(distance: float, volume: float, good: int) -> list[Row]:
     ("distance", "volume", "good", "missed"), [(0.9, 1.1, 4, 0), (1.1, 1.1, 4, 2), (0.9, 0.99, 5, 2), (0.9, 0.97, 4, 3), (0.9, 1.1, 2, 1)]
 )
 def test_what_is_asked_of_many_objectives(distance, volume, good, missed):
-    assert sum(not one.met for one in judged.TARGETS["many"](many_rows(distance, volume, good))) == missed
+    assert sum(not one.met for one in BENCHES["many"].targets(many_rows(distance, volume, good))) == missed
 
 
 @pytest.mark.parametrize(("name", "key", "least"), [("uf", "igd", 7), ("zdt", "igd", 3), ("constrained", "volume", 12)])
-def test_the_best_median_is_asked_on_a_share(name, key, least, monkeypatch, capsys):
-    functions = cases.the_set(name).functions
+def test_the_best_median_is_asked_on_a_share(name, key, least):
+    functions = plain.FUNCTIONS[name]()
     for good in (least, least - 1):
         better = 2.0 if key == "volume" else 0.5
         rows = [
@@ -146,26 +146,24 @@ def test_the_best_median_is_asked_on_a_share(name, key, least, monkeypatch, caps
             for i, one in enumerate(functions)
             for row in against_all(name, one.name, key, one.evaluations, [0.0, better if i < good else 1 / better, 9.0], [1.0])
         ]
-        assert [one.met for one in judged.TARGETS[name](rows)] == [good == least]
-        monkeypatch.setattr(command, "_run", lambda one, found, effort, rows=rows: found.extend(rows) or False)
-        assert main(["bench", name]) == (0 if good == least else 1)
-        assert f"{good} of {len(functions)}" in capsys.readouterr().out
-    several = len(cases.solvers_of(name))
-    assert judged.TARGETS[name](rows[several:]) == [], "not all functions were measured"
-    assert judged.TARGETS[name]([row for row in rows if row.who != "NSGA-II"]) == [], "not all rivals were measured"
+        assert [one.met for one in BENCHES[name].targets(rows)] == [good == least]
+        assert f"{good} of {len(functions)}" in BENCHES[name].report(rows)
+    several = len(solvers_of(name))
+    assert BENCHES[name].targets(rows[several:]) == [], "not all functions were measured"
+    assert BENCHES[name].targets([row for row in rows if row.who != "NSGA-II"]) == [], "not all rivals were measured"
     rows[0].values["evaluations"] = [1000.0]
-    assert judged.TARGETS[name](rows) == [], "not with all evaluations"
+    assert BENCHES[name].targets(rows) == [], "not with all evaluations"
 
 
 def test_where_all_found_nothing_none_is_the_best():
-    assert judged._nowhere_behind(rows_of("MW1", "volume", 1.0, MACS=[0.0], NSGA_II=[0.0]), ["MW1"], "volume", 1.0) == []
-    assert judged._nowhere_behind(rows_of("UF1", "igd", 1.0, MACS=[np.inf], NSGA_II=[np.inf]), ["UF1"], "igd", 1.0) == []
+    assert contest.as_good_as_the_best(rows_of("MW1", "volume", 1.0, MACS=[0.0], NSGA_II=[0.0]), ["MW1"], "volume", 1.0) == []
+    assert contest.as_good_as_the_best(rows_of("UF1", "igd", 1.0, MACS=[np.inf], NSGA_II=[np.inf]), ["UF1"], "igd", 1.0) == []
 
 
 def test_runs_without_a_point_are_the_worst():
     rows = rows_of("MW1", "igd", 1.0, MACS=[np.inf, np.inf, 0.1], NSGA_II=[0.2, 0.2, np.inf])
-    assert judged.medians(rows, "MW1", "igd") == {"MACS": np.inf, "NSGA-II": 0.2}
-    assert judged.rank(rows, rows[0], "igd") == "-" and judged.rank(rows, rows[1], "igd") == "1"
+    assert contest.medians(rows, "MW1", "igd") == {"MACS": np.inf, "NSGA-II": 0.2}
+    assert contest.rank(rows, rows[0], "igd") == "-" and contest.rank(rows, rows[1], "igd") == "1"
 
 
 def indicators(rows: list[Row]) -> list[tuple]:
@@ -173,94 +171,50 @@ def indicators(rows: list[Row]) -> list[tuple]:
     return [(row.case, row.who, row.values["igd"], row.values["volume"]) for row in rows]
 
 
-@pytest.mark.slow
-def test_a_small_contest():
+ZDT = replace(next(one for one in contest.ALL_CONTESTS if one.name == "zdt"), rivals=("NSGA-II", "NSGA-III"))
+"""With two quick rivals alone."""
+
+
+def searched(keep, **settings) -> list[Row]:
+    """ZDT1 with few evaluations."""
     rows: list[Row] = []
-    Contest("constrained").bench(rows, 2, 300, ("MW1",), jobs=2)
-    assert [row.who for row in rows] == ["MACS", *cases.the_set("constrained").rivals]
-    for row in rows:
-        assert row.values["evaluations"] == [300.0, 300.0] and len(row.values["volume"]) == 2
-    text = Contest("constrained").report(rows)
-    assert "MW1" in text and "MISSED" not in text and all(len(line) <= 160 for line in text.splitlines())
-
-
-@pytest.fixture
-def two_rivals(monkeypatch):
-    """Sets with two quick rivals alone."""
-    whole = cases.the_set
-    for module in (cases, contest):
-        monkeypatch.setattr(module, "the_set", lambda name: replace(whole(name), rivals=("NSGA-II", "NSGA-III")))
+    ZDT.measure(rows, Effort(("ZDT1",), evaluations=200, keep=str(keep), **settings))
+    return rows
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("two_rivals")
 def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys):
-    first: list[Row] = []
-    again: list[Row] = []
-    Contest("zdt").bench(first, 1, 200, ("ZDT1",), jobs=2, keep=str(tmp_path))
+    alone = searched(tmp_path, rounds=2, solvers=("MACS",))
+    assert [row.who for row in alone] == ["MACS"] and contest.UNJUDGED in ZDT.bench.report(alone)
+    first = searched(tmp_path, rounds=2, jobs=2)
+    assert [row.who for row in first] == ["MACS", *ZDT.rivals] and indicators(first[:1]) == indicators(alone)
+    assert all(row.values["evaluations"] == [200.0, 200.0] for row in first)
     (folder,) = tmp_path.iterdir()
     made = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nc")}
-    assert len(made) == 1 + len(cases.the_set("zdt").rivals) and folder.name.startswith("zdt-100-")
-    assert all(len(row.values["igd"]) == 1 for row in first)
+    assert len(made) == 6 and folder.name.startswith("zdt-100-")
 
     next(path for path in made if "__MACS__" in str(path)).unlink()
-    Contest("zdt").bench(again, 1, 200, ("ZDT1",), keep=str(tmp_path))
+    again = searched(tmp_path, rounds=2)
     assert indicators(again) == indicators(first), "one process finds what two found"
     now = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nc")}
     assert len(now) == len(made) and sum(now[path] != made[path] for path in made) == 1, "only what was missing is made"
 
-    # After Ctrl-C there is what was finished; another code makes its own.
-    monkeypatch.setattr(searches.Study, "run", lambda *arguments, **settings: (_ for _ in ()).throw(KeyboardInterrupt))
+    # After Ctrl-C there are the seeds that all solvers have finished; another code makes its own.
+    monkeypatch.setattr(contest.Study, "run", lambda *arguments, **settings: (_ for _ in ()).throw(KeyboardInterrupt))
+    next(folder.glob("*NSGA-II_*/0002.nc"), next(folder.glob("*NSGA-II/0002.nc"))).unlink()
     interrupted: list[Row] = []
     with pytest.raises(KeyboardInterrupt):
-        Contest("zdt").bench(interrupted, 1, 200, ("ZDT1",), keep=str(tmp_path))
-    assert indicators(interrupted) == indicators(first)
-    monkeypatch.setattr(searches, "code", lambda: "0" * searches.DIGITS)
+        ZDT.measure(interrupted, Effort(("ZDT1",), evaluations=200, keep=str(tmp_path), rounds=2))
+    assert [row.values["igd"] for row in interrupted] == [row.values["igd"][:1] for row in first]
+    monkeypatch.setattr(contest, "code", lambda: "0" * contest.DIGITS)
     with pytest.raises(KeyboardInterrupt):
-        Contest("zdt").bench([], 1, 200, ("ZDT1",), keep=str(tmp_path))
+        searched(tmp_path)
     assert f"searches in {folder.name} are of other code" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("two_rivals")
-def test_only_some_solvers(tmp_path):
-    """Then nothing is judged, and a later call makes the others: the seeds are the same."""
-    alone: list[Row] = []
-    all_of_them: list[Row] = []
-    Contest("zdt").bench(alone, 2, 200, ("ZDT1",), keep=str(tmp_path), only=["MACS"])
-    assert [row.who for row in alone] == ["MACS"] and len(list(tmp_path.rglob("*.nc"))) == 2
-    text = Contest("zdt").report(alone)
-    assert contest.UNJUDGED in text and "MISSED" not in text
-    Contest("zdt").bench(all_of_them, 2, 200, ("ZDT1",), jobs=2, keep=str(tmp_path))
-    assert [row.who for row in all_of_them] == list(cases.solvers_of("zdt")) and indicators(all_of_them[:1]) == indicators(alone)
-
-
-def test_ours_alone_has_its_medians_and_no_test_of_ranks():
-    rows = [Row("UF1", "MACS", {"igd": [0.1, 0.2, 0.3, 0.4, 0.5], "seconds": [1.0] * 5, "evaluations": [10.0] * 5, "points": [9.0] * 5})]
-    text = Contest("uf").report(rows)
-    assert contest.UNJUDGED in text and "0.300 [0.200, 0.400]" in text
-    assert contest.p_values(rows, "igd") == {}
-    assert not {"rank", "rival", "Holm"} & {word for column in judged.columns_of(rows, {}) for word in column[:2]}
-
-
-@pytest.mark.slow
-def test_an_interrupt_keeps_the_seeds_that_all_have_finished(tmp_path):
-    """As after Ctrl-C: seed 2 of one solver is missing."""
-    functions = [cases.zdt(1)]
-    ((name, batch),) = searches.studies("zdt", ("NSGA-II",), functions, 2, 200).items()
-    searches.search(batch, tmp_path / name, 2)
-    whole = contest.compared(functions[0], searches.finished(batch, tmp_path / name)["ZDT1"])
-    next((tmp_path / name).glob("*NSGA-II*/0002.nc")).unlink()
-    rows = contest.compared(functions[0], searches.finished(batch, tmp_path / name)["ZDT1"])
-    assert [len(row.values["igd"]) for row in rows] == [1, 1] and [len(row.values["igd"]) for row in whole] == [2, 2]
-    assert [row.values["igd"][0] for row in rows] == [row.values["igd"][0] for row in whole]
-    next((tmp_path / name).glob("*MACS*/0001.nc")).unlink()
-    assert contest.compared(functions[0], searches.finished(batch, tmp_path / name)["ZDT1"]) == []
-
-
 def test_a_folder_of_other_things_is_refused(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(searches, "code", lambda: "0" * searches.DIGITS)
-    folder = tmp_path / f"zdt-100-{searches.code()}"
+    monkeypatch.setattr(contest, "code", lambda: "0" * contest.DIGITS)
+    folder = tmp_path / f"zdt-100-{contest.code()}"
     folder.mkdir()
     (folder / "letter.txt").write_text("dear reader")
     assert main(["bench", "zdt", "--seeds", "1", "--keep", str(tmp_path)]) == 2
@@ -269,12 +223,20 @@ def test_a_folder_of_other_things_is_refused(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_search_that_fails_is_no_result(tmp_path):
+def test_a_search_that_fails_is_no_result(tmp_path, monkeypatch):
     """A function of exactly so many rows as a problem's fingerprint needs."""
-    function = cases.Function("fails", lambda: (methodcaller("reshape", 8, 2), [(0, 1)] * 2), 2, 200, 100)
-    ((name, batch),) = searches.studies("zdt", (), [function], 1).items()
+    function = plain.PlainFunction("ZDT1", lambda: (methodcaller("reshape", 8, 2), [(0, 1)] * 2), 2, 200, 100)
+    monkeypatch.setitem(plain.FUNCTIONS, "zdt", lambda: (function,))
     with pytest.raises(RuntimeError, match="cannot reshape"):
-        searches.search(batch, tmp_path / name, 1)
+        replace(ZDT, rivals=()).measure([], Effort(keep=str(tmp_path)))
+
+
+def test_ours_alone_has_its_medians_and_no_test_of_ranks():
+    rows = [Row("UF1", "MACS", {"igd": [0.1, 0.2, 0.3, 0.4, 0.5], "seconds": [1.0] * 5, "evaluations": [10.0] * 5, "points": [9.0] * 5})]
+    text = BENCHES["uf"].report(rows)
+    assert contest.UNJUDGED in text and "0.300 [0.200, 0.400]" in text
+    assert contest.p_values(rows, "igd") == {}
+    assert not {"rank", "rival", "Holm"} & {word for column in contest.columns_of(rows, {}) for word in column[:2]}
 
 
 def test_differences_from_the_best_rival_are_counted():
@@ -283,12 +245,12 @@ def test_differences_from_the_best_rival_are_counted():
         *rows_of("MW2", "volume", 1.0, MACS=[1, 2, 3, 4, 5], NSGA_II=[6, 7, 8, 9, 10], RVEA=[1, 1, 1, 1, 1]),
         *rows_of("MW3", "volume", 1.0, MACS=[1, 2, 3, 4, 5], NSGA_II=[1, 2, 3, 4, 6], RVEA=[0, 0, 0, 0, 0]),
     ]
-    line = judged.against_the_best(rows, "volume", contest.p_values(rows, "volume"))[0]
+    line = contest.against_the_best(rows, "volume", contest.p_values(rows, "volume"))[0]
     assert line.endswith("better on 1, worse on 1, no difference shown on 1.")
     turned = [row for row in rows if row.case == "MW1"]
     turned = [Row(row.case, row.who, {"igd": row.values["volume"]}) for row in turned if row.who != "RVEA"]
-    assert "better on 0, worse on 1" in judged.against_the_best(turned, "igd", contest.p_values(turned, "igd"))[0]
-    assert judged.against_the_best(rows_of("MW1", "volume", 1.0, MACS=[1]), "volume", {}) == []
+    assert "better on 0, worse on 1" in contest.against_the_best(turned, "igd", contest.p_values(turned, "igd"))[0]
+    assert contest.against_the_best(rows_of("MW1", "volume", 1.0, MACS=[1]), "volume", {}) == []
 
 
 def test_p_values_are_corrected_for_all_rivals():
@@ -296,33 +258,3 @@ def test_p_values_are_corrected_for_all_rivals():
     p = contest.p_values(rows, "igd")
     assert p["UF1", "NSGA-II"] == pytest.approx(2 * 2 / 252) and p["UF1", "RVEA"] == 1.0
     assert contest.p_values(rows_of("UF1", "igd", 1.0, MACS=[1, 2], NSGA_II=[6, 7]), "igd") == {}
-
-
-def test_all_sets_are_kinds():
-    assert set(NAMES) <= set(command.KINDS)
-
-
-def test_so_many_seeds_as_are_asked_for(monkeypatch, tmp_path, capsys):
-    asked = []
-    monkeypatch.setattr(Contest, "bench", lambda self, rows, **whole: asked.append((self.name, *whole.values())))
-    page = tmp_path / "zdt.md"
-    some = ["--solvers", "NSGA-II", "MACS", "--page", str(page)]
-    assert main(["bench", "zdt"]) == main(["bench", "zdt", "--seeds", "3", "--jobs", "2", "--keep", "here", *some]) == 0
-    assert asked == [("zdt", 10, 1, None, None), ("zdt", 3, 2, "here", ("NSGA-II", "MACS"))]
-    effort = Effort(seeds=3, jobs=2, keep="here", solvers=("MACS", "MOEA/D"))
-    assert "--seeds 3 --jobs 2 --solvers MACS MOEA/D --page" in header_of("zdt", effort, page).command
-    for call, words in (
-        (["inner", "--seeds", "2"], "'inner' has none"),
-        (["zdt", "--quick", "--seeds", "2"], "--quick has one seed"),
-        (["inner", "--jobs", "2"], "--jobs"),
-        (["uf", "--quick", "--jobs", "2"], "--jobs"),
-        (["inner", "--keep", "here"], "--keep"),
-        (["uf", "--quick", "--keep", "here"], "--keep"),
-        (["inner", "--solvers", "MACS"], "--solvers"),
-        (["uf", "--quick", "--solvers", "MACS"], "--solvers"),
-        (["--solvers", "MACS"], "--solvers: of which one"),
-        (["uf", "--solvers", "MACS", "RVEA"], "unknown solver 'RVEA'"),
-        (["uf", "--solvers", "NSGA-II"], "MACS must be among them"),
-    ):
-        assert main(["bench", *call]) == 2
-        assert words in capsys.readouterr().err

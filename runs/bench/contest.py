@@ -1,0 +1,338 @@
+"""Benchmarks of searches on plain functions: MACS against other algorithms at equal evaluations, seed by seed.
+
+The searches are those of studies: in a folder that is kept, the same command makes only those that are missing.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from macs.front import Front
+
+from ..measures.indicators import hypervolume, igd
+from ..measures.references import union
+from ..measures.statistics import holm, pairwise, summarise
+from ..report.page_header import DIGITS, code
+from ..study import Study
+from . import functions as plain
+from .contract import SECONDS, Bench, Column, Effort, Row, Target, column, rounds_of, short
+from .functions import FUNCTIONS, OURS, PlainFunction, solvers
+
+SPAWNED_FROM = 2026
+"""The seed that the seeds of all searches are spawned from."""
+WORDS = {"igd": "IGD", "volume": "hypervolume"}
+LARGER = ("volume",)
+"""Indicators of which larger values are better."""
+SIGNIFICANT = 0.05
+UNJUDGED = "Not judged: what is asked is asked of all functions with all their evaluations, against all rivals."
+ABOUT = (
+    "MACS with its defaults against algorithms of pymoo with theirs, at equal evaluations. Populations are as large as the archive of "
+    "MACS; NSGA-III gives all its non-dominated points. Points: how many there are. IGD: mean distance of the true front from the "
+    "points, in the objectives' units for UF (as in the competition), else in ranges of the front. Hypervolume: in these ranges, up to "
+    "1.1. Distance: of the points from the front, in closed form. Medians and quartiles over seeds; rank: of the median among all; to "
+    "best rival: the median of MACS divided by the best rival's (IGD: below 1 is better, hypervolume: above 1); p: two-sided "
+    "Mann-Whitney test against MACS, from five seeds on, by {by}, corrected by Holm over the rivals of each function. NSGA-III, MOEA/D "
+    "and RVEA have as many directions as points: a simplex lattice where one has so many, else evenly spread ones. All seeds are spawned "
+    "from 2026.{ranges}"
+)
+
+Fronts = dict[str, list[Front]]
+"""By solver, one for each seed that all solvers have finished."""
+
+
+@dataclass(frozen=True)
+class Contest:
+    """What is compared on a set of functions, and how it is judged."""
+
+    name: str  # of the set
+    heading: str
+    rivals: tuple[str, ...]
+    quick: tuple[str, ...]  # functions of the quick benchmark
+    by: str  # the indicator that tests and targets are of
+    share: float | None = None  # of the functions on which the best median of all is asked; None: as `asked_of_many` says
+
+    @property
+    def solvers(self) -> tuple[str, ...]:
+        """Names, ours first."""
+        return (OURS, *self.rivals)
+
+    def chosen(self, effort: Effort) -> dict[str, PlainFunction]:
+        """Its functions, or those of an effort, with no more evaluations than that has."""
+        least = [replace(one, evaluations=min(effort.evaluations or one.evaluations, one.evaluations)) for one in FUNCTIONS[self.name]()]
+        return {one.name: one for one in least if not effort.cases or one.name in effort.cases}
+
+    def studies(self, effort: Effort) -> dict[str, Study]:
+        """Studies of all functions that have as many points, by the names of their folders. Searches that other code or other versions of
+        the packages made are in other folders."""
+        groups: dict[int, list[PlainFunction]] = {}
+        for one in self.chosen(effort).values():
+            groups.setdefault(one.points, []).append(one)
+        return {
+            f"{self.name}-{points}-{code()}": Study(
+                f"{self.name}, {points} points",
+                problems={one.name: one.stated() for one in group},
+                solvers=solvers(self.rivals, points),
+                evaluations={one.name: one.evaluations for one in group},
+                runs=effort.rounds,
+                seed=SPAWNED_FROM,
+                verify=None,
+            )
+            for points, group in groups.items()
+        }
+
+    def complete(self, rows: Sequence[Row]) -> list[str]:
+        """The functions, if all were measured with all solvers and all evaluations; else none, and nothing is judged."""
+        budgets = {one.name: one.evaluations for one in FUNCTIONS[self.name]()}
+        full = [row.case for row in rows if row.who == OURS and row.of("evaluations") >= budgets[row.case]]
+        return full if {row.who for row in rows} >= set(self.solvers) and len(full) == len(budgets) else []
+
+    def targets(self, rows: Sequence[Row]) -> list[Target]:
+        """What is asked of the set."""
+        cases = self.complete(rows)
+        if not cases or self.share is None:
+            return asked_of_many(rows, cases)
+        good = as_good_as_the_best(rows, cases, self.by, 1.0)
+        asked = f"best median {WORDS[self.by]} on at least {100 * self.share:g} %"
+        return [Target(f"{len(cases)} functions", asked, f"{len(good)} of {len(cases)}", len(good) >= self.share * len(cases))]
+
+    def measure(self, rows: list[Row], effort: Effort) -> None:
+        """Make all searches; `rows` are filled at the end, also if it is an interrupt."""
+        functions, batches = self.chosen(effort), self.studies(effort)
+        with TemporaryDirectory(prefix="macs_") if effort.keep is None else nullcontext(effort.keep) as folder:
+            interrupted, fronts = False, dict[str, Fronts]()
+            try:
+                for name, batch in batches.items():
+                    search(batch, Path(folder) / name, effort)
+            except KeyboardInterrupt:
+                interrupted = True
+            for name, batch in batches.items():
+                if (Path(folder) / name).exists():
+                    fronts |= finished_fronts(batch, Path(folder) / name, effort.solvers)
+        rows += [row for name, one in functions.items() for row in compared(one, fronts.get(name, {}))]
+        if interrupted:
+            raise KeyboardInterrupt
+
+    def about(self, rows: Sequence[Row]) -> str:
+        """What is measured."""
+        known = any(row.values.get("igd") for row in rows)
+        ranges = "" if known else " Ranges are those of what is non-dominated among all that all found."
+        return f"{self.heading}: {ABOUT.format(by=WORDS[self.by], ranges=ranges)}"
+
+    def notes(self, rows: Sequence[Row]) -> list[str]:
+        """How ours stands against the best rivals, and whether the set is judged."""
+        return against_the_best(rows, self.by, p_values(rows, self.by)) + ([] if self.complete(rows) else [UNJUDGED])
+
+    @property
+    def bench(self) -> Bench:
+        """The benchmark of it, with ten seeds."""
+        return Bench(
+            title=self.name,
+            about=self.about,
+            full=Effort(rounds=10),
+            quick=Effort(self.quick, evaluations=1000),
+            whole=self.measure,
+            columns=lambda rows: columns_of(rows, p_values(rows, self.by)),
+            targets=self.targets,
+            notes=self.notes,
+            modules=(plain,),
+            seeded=True,
+            kept=True,
+        )
+
+
+def search(batch: Study, folder: Path, effort: Effort) -> None:
+    """Make the searches that a study's folder lacks, of all solvers or only some."""
+    others = sorted(one.name for one in folder.parent.glob(f"{folder.name[:-DIGITS]}*") if one != folder)
+    if others and not folder.exists():
+        print(f"{batch.name}: searches in {', '.join(others)} are of other code, and are not used", file=sys.stderr)
+    summary = batch.run(folder, jobs=effort.jobs, solvers=effort.solvers or None, progress=True)
+    if summary.failed:
+        raise RuntimeError(f"searches failed, so there is nothing to compare:\n{summary}")
+
+
+def finished_fronts(batch: Study, folder: Path, only: Sequence[str] = ()) -> dict[str, Fronts]:
+    """By function: the fronts of the seeds that all solvers have finished, or all of these."""
+    runs = {(run.cell.problem, run.cell.solver, run.number): run for run in batch.status(folder).runs if run.finished}
+    who = batch.chosen(only or None)
+    fronts: dict[str, Fronts] = {}
+    for function in dict.fromkeys(cell.problem for cell in batch.cells):
+        numbers = [n for n in range(1, batch.runs + 1) if all((function, one, n) in runs for one in who)]
+        fronts[function] = {one: [runs[function, one, n].front for n in numbers] for one in who}
+    return fronts
+
+
+def compared(function: PlainFunction, fronts: Fronts) -> list[Row]:
+    """The rows of a function from its fronts; none if there are none."""
+    if not any(fronts.values()):
+        return []
+    known = [front.F for own in fronts.values() for front in own if len(front)]
+    truth = function.front() if function.front else np.asarray(union(known)) if known else None
+    rows = []
+    for who, own in fronts.items():
+        row = Row(function.name, who)
+        for front in own:
+            values: dict[str, float] = {
+                "evaluations": front.stats["evaluations"],
+                "points": len(front),
+                "seconds": front.stats["wall_time"],
+                "volume": hypervolume(front.F, truth) if truth is not None and len(front) else 0.0,
+            }
+            if function.front and truth is not None:
+                raw = function.name.startswith("UF")
+                values["igd"] = igd(front.F, truth, normalise=not raw, curve=not raw)
+            if function.distance and len(front):
+                values["distance"] = float(function.distance(front.F).mean())
+            # An infinite distance, of a front without points, counts: `Row.once` would leave it out.
+            for key, value in values.items():
+                row.values.setdefault(key, []).append(float(value))
+        rows.append(row)
+    return rows
+
+
+# Medians, and what is asked
+
+
+def medians(rows: Sequence[Row], case: str, key: str) -> dict[str, float]:
+    """The median of an indicator by the name of the solver; infinite where runs found no point."""
+    return {row.who: summarise(row.values[key]).median for row in rows if row.case == case and row.values.get(key)}
+
+
+def best_rival(values: Mapping[str, float], key: str) -> tuple[str, float]:
+    """The name and the median of the best of the others."""
+    others = {who: value for who, value in values.items() if who != OURS}
+    who = (max if key in LARGER else min)(others, key=lambda one: others[one])
+    return who, others[who]
+
+
+def as_good_as_the_best(rows: Sequence[Row], cases: Sequence[str], key: str, part: float) -> list[str]:
+    """The functions on which the median of ours is at least so good a part of the best rival's; not those on which all found nothing."""
+    good = []
+    for case in cases:
+        values = medians(rows, case, key)
+        rival = best_rival(values, key)[1]
+        if values[OURS] >= part * rival and values[OURS] > 0.0 if key in LARGER else values[OURS] <= rival / part and values[OURS] < np.inf:
+            good.append(case)
+    return good
+
+
+def asked_of_many(rows: Sequence[Row], cases: Sequence[str]) -> list[Target]:
+    """Nearer to the front and larger than NSGA-III on DTLZ2; the best or nearly so on most with five objectives."""
+    made = []
+    for case in [one for one in cases if one.startswith("DTLZ2,")]:
+        for key, word in (("distance", "mean distance below NSGA-III's"), ("volume", "hypervolume above NSGA-III's")):
+            values = medians(rows, case, key)
+            ours, theirs = values[OURS], values["NSGA-III"]
+            made.append(Target(case, word, f"{short(ours)} to {short(theirs)}", ours > theirs if key in LARGER else ours < theirs))
+    five = [case for case in cases if case.endswith("5 objectives")]
+    if five:
+        good = as_good_as_the_best(rows, five, "volume", 0.98)
+        asked = "best or within 2 % of the best rival's hypervolume on 4"
+        made.append(Target("5 objectives", asked, f"{len(good)} of {len(five)}", len(good) >= 4))
+    return made
+
+
+def p_values(rows: Sequence[Row], key: str) -> dict[tuple[str, str], float]:
+    """p of each rival against ours on each function by an indicator, after Holm's correction; none of fewer than five seeds, too few for a
+    test of ranks."""
+    p: dict[tuple[str, str], float] = {}
+    for case in dict.fromkeys(row.case for row in rows):
+        own = {row.who: row for row in rows if row.case == case}
+        if len(own) < 2 or len(own[OURS].values[key]) < 5:
+            continue
+        pairs = pairwise({who: row.values[key] for who, row in own.items()}, larger=key in LARGER)
+        mine = [pair for pair in pairs if OURS in (pair.first, pair.second)]
+        for pair, value in zip(mine, holm([pair.p for pair in mine]), strict=True):
+            p[case, pair.second if pair.first == OURS else pair.first] = float(value)
+    return p
+
+
+def against_the_best(rows: Sequence[Row], key: str, p: Mapping[tuple[str, str], float]) -> list[str]:
+    """A line on how many functions ours differs from the best rival of each, and an empty one; none if nothing was tested."""
+    better, worse, tested = 0, 0, 0
+    for case in dict.fromkeys(row.case for row in rows):
+        values = medians(rows, case, key)
+        who, rival = best_rival(values, key) if len(values) > 1 else ("", 0.0)
+        if (case, who) in p:
+            tested += 1
+            if p[case, who] < SIGNIFICANT:
+                ahead = (values[OURS] > rival) == (key in LARGER)
+                better, worse = better + ahead, worse + (not ahead)
+    if not tested:
+        return []
+    counts = f"better on {better}, worse on {worse}, no difference shown on {tested - better - worse}"
+    return [f"Against the best rival of each function (p < {SIGNIFICANT:g}): {counts}.", ""]
+
+
+# The table
+
+
+def columns_of(rows: Sequence[Row], p: Mapping[tuple[str, str], float]) -> tuple[Column, ...]:
+    """The columns of a table: those indicators that there are, and comparisons where there are several solvers."""
+    columns: list[Column] = []
+    several = len({row.who for row in rows}) > 1
+    for key, title in (("igd", "IGD"), ("volume", "hypervolume"), ("distance", "distance")):
+        if any(row.values.get(key) for row in rows):
+            columns.append((title, "", lambda row, key=key: spread(row, key)))  # type: ignore[misc]
+            if several:
+                columns.append(("", "rank", lambda row, key=key: rank(rows, row, key)))  # type: ignore[misc]
+            if several and key != "distance":
+                columns.append(("to best", "rival", lambda row, key=key: ratio(rows, row, key)))  # type: ignore[misc]
+    tested: Column = ("p", "Holm", lambda row: f"{p[row.case, row.who]:.2g}" if (row.case, row.who) in p else "")
+    counts = (column("evalua-", "tions", "evaluations", form=".0f"), column("", "points", "points", form=".0f"))
+    return (*columns, *([tested] if several else []), *counts, SECONDS, rounds_of("seconds", "seeds"))
+
+
+def spread(row: Row, key: str) -> str:
+    """Median and quartiles, in which runs without a point are infinite."""
+    values = row.values.get(key)
+    if not values:
+        return "-"
+    middle = summarise(values, larger=key in LARGER)
+    return f"{short(middle.median)} [{short(middle.lower)}, {short(middle.upper)}]" if len(values) > 1 else short(middle.median)
+
+
+def rank(rows: Sequence[Row], row: Row, key: str) -> str:
+    """The place of the median among all solvers, 1 for the best; none where half the runs found nothing."""
+    values = medians(rows, row.case, key)
+    if row.who not in values or values[row.who] == (0.0 if key in LARGER else np.inf):
+        return "-"
+    others, own = np.array(list(values.values())), values[row.who]
+    return str(1 + int((others > own).sum() if key in LARGER else (others < own).sum()))
+
+
+def ratio(rows: Sequence[Row], row: Row, key: str) -> str:
+    """Of ours to the best rival's median; empty for others."""
+    values = medians(rows, row.case, key)
+    if row.who != OURS or row.who not in values or len(values) < 2:
+        return ""
+    rival = best_rival(values, key)[1]
+    return short(values[OURS] / rival) if rival else "-"
+
+
+PYMOO = ("NSGA-II", "NSGA-III", "MOEA/D", "AGE-MOEA-II")
+ALL_CONTESTS = (
+    Contest("many", "MANY OBJECTIVES", (*PYMOO, "RVEA"), ("DTLZ2, 5 objectives",), "volume"),
+    Contest("uf", "UF1 TO UF10 OF CEC 2009", PYMOO, ("UF1", "UF8"), "igd", 0.7),
+    Contest("zdt", "ZDT", ("NSGA-II", "NSGA-III", "MOEA/D", "SMS-EMOA", "AGE-MOEA-II"), ("ZDT1", "ZDT3"), "igd", 0.6),
+    Contest(
+        "constrained",
+        "CONSTRAINTS",
+        ("NSGA-II", "NSGA-III", "SMS-EMOA", "AGE-MOEA-II", "RVEA", "C-TAEA"),
+        ("MW1", "C2DTLZ2"),
+        "volume",
+        0.6,
+    ),
+)
+CONTESTS = {one.name: one.bench for one in ALL_CONTESTS}
+
+
+def solvers_of(name: str) -> tuple[str, ...]:
+    """The names of the solvers of a set, ours first."""
+    return next(one.solvers for one in ALL_CONTESTS if one.name == name)

@@ -1,1 +1,0 @@
-"""Benchmarked problems as users of other programs state them."""
