@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from problems.checks import apart, check_text, shown
-from problems.compiled import CompiledProblem, Objective, Variable
+from problems.compiled import Objective, Variable
 from problems.vector import CompiledVectorProblem, real_numbers
 from transcription.trajectories.limits import excess
 
@@ -318,20 +318,3 @@ def reevaluation(problem: CompiledVectorProblem, z: np.ndarray) -> Reevaluation:
     F, violation, violations = evaluated_again(problem, z[None])
     objectives = {goal.name: float(goal.sign * value) for goal, value in zip(problem.goals, F[0], strict=True)}
     return Reevaluation(objectives, violations[0], float(violation[0]))
-
-
-def check_same_vectors(known: CompiledVectorProblem, other: CompiledVectorProblem | CompiledProblem) -> CompiledVectorProblem:
-    """`other`, if decisions of the known problem can be evaluated with it. Raises ValueError for other variables or objectives."""
-    place = f"points of '{known.name}' cannot be evaluated with '{other.name}'"
-    if not isinstance(other, CompiledVectorProblem):
-        raise ValueError(f"{place}: that is no vector problem")
-
-    def parts(problem: CompiledVectorProblem) -> dict[str, list[str]]:
-        objectives = [f"{goal.sense} {goal.name} [{goal.unit}]" for goal in problem.goals]
-        return {"variables": [v.name for v in problem.variables], "objectives": objectives}
-
-    ours, theirs = parts(known), parts(other)
-    for what, names in ours.items():
-        if theirs[what] != names:
-            raise ValueError(f"{place}: its {what} are {', '.join(theirs[what])}, not {', '.join(names)}")
-    return other

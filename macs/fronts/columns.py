@@ -1,4 +1,4 @@
-"""Columns of a front's file: tables of what they are, named things as arrays and back, JSON."""
+"""What the arrays of a front's file are, checks of those that are read, and named things as arrays and back."""
 
 from __future__ import annotations
 
@@ -15,36 +15,35 @@ from problems.compiled import Limit, Variable
 from ..io.netcdf import Group, Labelled, Labels, words
 
 NUMBER, COUNT, TEXT = "f", "i", "O"
-"""Kinds of a column: float64, whole numbers, str."""
+"""Kinds of an array: float64, whole numbers, str."""
 KINDS = {NUMBER: "numbers", COUNT: "whole numbers", TEXT: "texts"}
 
 
-class Column(NamedTuple):
-    """One array of a file.
-
-    `rows` is the name of the column of `Points` that it is, where it has one entry for each point as it is; `optional`, whether it is left
-    out where the points have no such column.
-    """
+class FileArray(NamedTuple):
+    """One array of a file."""
 
     dimensions: tuple[str, ...]
     kind: str
     long_name: str
     units: str = "1"
-    rows: str = ""
-    optional: bool = False
+    optional: bool = False  # whether files need not have it
 
-    @property
-    def labels(self) -> Labels:
-        """For the reader of the file."""
-        return Labels(self.dimensions, self.long_name, self.units)
+    def of(self, values: Any) -> np.ndarray:
+        """Values as an array of this kind, with NaN for None."""
+        if self.kind == TEXT:
+            return words(values)
+        if self.kind == COUNT:
+            return np.asarray(values, dtype=np.int32)
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
-def labelled(table: Mapping[str, Column], values: Mapping[str, np.ndarray], attrs: dict[str, Any]) -> Labelled:
+def labelled(table: Mapping[str, FileArray], values: Mapping[str, np.ndarray], attrs: dict[str, Any]) -> Labelled:
     """Arrays of a table with their labels."""
-    return Labelled(values, {name: table[name].labels for name in values}, attrs)
+    labels = {name: Labels(table[name].dimensions, table[name].long_name, table[name].units) for name in values}
+    return Labelled(values, labels, attrs)
 
 
-def checked(table: Mapping[str, Column], group: Group) -> Labelled:
+def checked(table: Mapping[str, FileArray], group: Group) -> Labelled:
     """The arrays of a group, which are those of a table."""
     unknown = [name for name in group.arrays if name not in table]
     if unknown:
@@ -80,34 +79,27 @@ def distinct(names: Sequence[Any], what: str) -> None:
         raise ValueError(f"two {what} have the same name")
 
 
-def variable_table(dimension: str, what: str, limits: bool = False) -> dict[str, Column]:
-    """The columns of `variable_columns`. The unit of limits is optional: there are files from before limits had one."""
+def variable_table(dimension: str, what: str, limits: bool = False) -> dict[str, FileArray]:
+    """The arrays of variables or limits along a dimension. The unit of limits is optional: there are files from before limits had one."""
     along, units = (dimension,), f"see {dimension}_unit"
     table = {
-        dimension: Column(along, TEXT, f"name of the {what}"),
-        f"{dimension}_lower": Column(along, NUMBER, f"lower bound of the {what}", units),
-        f"{dimension}_upper": Column(along, NUMBER, f"upper bound of the {what}", units),
-        f"{dimension}_scale": Column(along, NUMBER, f"scale of the {what}", units),
-        f"{dimension}_unit": Column(along, TEXT, f"unit of the {what}", optional=limits),
+        dimension: FileArray(along, TEXT, f"name of the {what}"),
+        f"{dimension}_lower": FileArray(along, NUMBER, f"lower bound of the {what}", units),
+        f"{dimension}_upper": FileArray(along, NUMBER, f"upper bound of the {what}", units),
+        f"{dimension}_scale": FileArray(along, NUMBER, f"scale of the {what}", units),
+        f"{dimension}_unit": FileArray(along, TEXT, f"unit of the {what}", optional=limits),
     }
     if not limits:
-        table[f"{dimension}_period"] = Column(along, NUMBER, f"period of the {what}, NaN if it is not periodic", units)
+        table[f"{dimension}_period"] = FileArray(along, NUMBER, f"period of the {what}, NaN if it is not periodic", units)
     return table
 
 
 def variable_columns(variables: Sequence[Variable | Limit], dimension: str, limits: bool = False) -> dict[str, np.ndarray]:
-    """Names, bounds, scales and units along a dimension; of variables, periods too."""
-    columns = {
-        dimension: words([v.name for v in variables]),
-        f"{dimension}_lower": np.array([v.lower for v in variables], dtype=float),
-        f"{dimension}_upper": np.array([v.upper for v in variables], dtype=float),
-        f"{dimension}_scale": np.array([v.scale for v in variables], dtype=float),
-        f"{dimension}_unit": words([v.unit for v in variables]),
+    """Variables or limits as the arrays of `variable_table`."""
+    return {
+        array: column.of([getattr(v, array.removeprefix(dimension).lstrip("_") or "name") for v in variables])
+        for array, column in variable_table(dimension, "", limits).items()
     }
-    if not limits:
-        periods = [getattr(v, "period", None) for v in variables]
-        columns[f"{dimension}_period"] = np.array([np.nan if period is None else period for period in periods], dtype=float)
-    return columns
 
 
 def read_variables(data: Labelled, dimension: str) -> tuple[Variable, ...]:
@@ -129,18 +121,18 @@ def read_limits(data: Labelled, dimension: str) -> tuple[Limit, ...]:
     return tuple(Limit(*row) for row in zip(names, lower.tolist(), upper.tolist(), scale.tolist(), units, strict=True))
 
 
-def named_table(name: str, dimension: str, what: str, entry: str) -> dict[str, Column]:
-    """The columns of `named_columns`."""
+def named_table(name: str, dimension: str, what: str, entry: str) -> dict[str, FileArray]:
+    """The arrays of dicts of numbers: values, which entries and which dicts there are."""
     return {
-        dimension: Column((dimension,), TEXT, f"name of the {entry}"),
-        name: Column(("point", dimension), NUMBER, what),
-        f"{name}_given": Column(("point", dimension), COUNT, f"1 where there is a number in {name}, else 0"),
-        f"{name}_known": Column(("point",), COUNT, f"1 for points that have {name}, else 0"),
+        dimension: FileArray((dimension,), TEXT, f"name of the {entry}"),
+        name: FileArray(("point", dimension), NUMBER, what),
+        f"{name}_given": FileArray(("point", dimension), COUNT, f"1 where there is a number in {name}, else 0"),
+        f"{name}_known": FileArray(("point",), COUNT, f"1 for points that have {name}, else 0"),
     }
 
 
 def named_columns(rows: Sequence[Mapping[str, float] | None], name: str, dimension: str) -> dict[str, np.ndarray]:
-    """Dicts of numbers as an array; which entries and which dicts there are."""
+    """Dicts of numbers as the arrays of `named_table`."""
     labels = list(dict.fromkeys(key for row in rows for key in row or {}))
     values = np.array([[(row or {}).get(label, np.nan) for label in labels] for row in rows], dtype=float).reshape(len(rows), len(labels))
     given = np.array([[label in (row or {}) for label in labels] for row in rows], dtype=np.int8).reshape(values.shape)

@@ -1,25 +1,29 @@
-"""A front as labelled arrays and back: the root, and a group for each phase's trajectories. Nothing here knows files.
+"""A front as labelled arrays and back: the root, and a group for each phase. Nothing here knows files.
 
-`ROOT`, `PHASE` and the names of states, controls and path constraints are all that a front's file has; its reader refuses anything else.
-Floats go through untouched. Decisions have a column for each variable that any point has, and `place`, where in the point's own vector it
-stands, -1 if it has no such variable. In a phase, each state, control and path constraint is an array of its own name; trajectories whose
-meshes differ in size are padded with NaN, and their true lengths stand beside them (`node_count`, `element_count`, ...). Attributes are
-texts and numbers; what has structure is JSON.
+`ROOT` and `Layout.table` are all that a front's file has; its reader refuses anything else. Floats go through untouched. Decisions have a
+column for each variable that any point has, and `place`, where in the point's own vector it stands, -1 if it has no such variable.
+Attributes are texts and numbers; what has structure is JSON.
 
-A new column of `Points` with an entry for each point is one more line of `ROOT`, with its `rows`, and `optional` for the sake of the files
-that do not have it.
+In a phase each state, control and path constraint is an array `(point, node)` of its own name, and so are each costate and the Hamiltonian;
+fronts without any costates have none of theirs. Between the ends of elements, states, controls and costates are the sums of their
+coefficients times the functions of their basis on [-1, 1]. Points whose meshes differ in size are padded with NaN; their true lengths are
+the arrays `<dimension>_count`, 0 for a point that has none.
+
+A new column of `Points` with an entry for each point is one more line of `points.COLUMNS`, optional for the sake of older files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from problems.compiled import Objective
+from problems.compiled import Limit, Objective, Variable
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 from transcription.numerics.polynomials import BASES
+from transcription.trajectories.costates import Costates, PhaseCostates
+from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 from ..io.netcdf import Group, Labelled, words
 from ..io.text import document
@@ -27,7 +31,7 @@ from .columns import (
     COUNT,
     NUMBER,
     TEXT,
-    Column,
+    FileArray,
     checked,
     distinct,
     labelled,
@@ -44,95 +48,160 @@ from .columns import (
     variable_columns,
     variable_table,
 )
-from .costate_arrays import MEANING, costate_columns, costate_names, costate_table, of_phase, read_costates, whole
-from .points import Points
+from .points import COLUMNS, Points
 from .provenance import read_source, read_stats, source_attributes, stats_attributes
-
-if TYPE_CHECKING:
-    from transcription.trajectories.costates import PhaseCostates
-    from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
 
 FORMAT = "MACS front"
 VERSION = 3
 
-ROOT: dict[str, Column] = {
-    "objectives": Column(("point", "objective"), NUMBER, "objectives in the user's senses", "see objective_unit"),
-    "objective": Column(("objective",), TEXT, "name of the objective"),
-    "objective_unit": Column(("objective",), TEXT, "unit of the objective"),
-    "objective_sense": Column(("objective",), TEXT, "minimize or maximize"),
-    "objective_scale": Column(("objective",), NUMBER, "scale of the objective, NaN if none was stated", "see objective_unit"),
-    "violation": Column(("point",), NUMBER, "largest scaled residual of any constraint", rows="violation"),
-    "status": Column(("point",), TEXT, "converged, infeasible, failed or timeout", rows="status"),
-    "optimality": Column(("point",), NUMBER, "scaled residual of Pareto optimality, NaN if not computed", rows="optimality"),
-    "note": Column(("point",), TEXT, "remark on the point", rows="notes"),
-    "defect": Column(
-        ("point",), NUMBER, "largest scaled difference of a simulated state, NaN if not simulated", rows="defect", optional=True
-    ),
-    "simulated_violation": Column(
-        ("point",), NUMBER, "largest scaled residual of any constraint as simulated", rows="simulated_violation", optional=True
-    ),
-    "simulated_objectives": Column(
+ROOT: dict[str, FileArray] = {
+    "objectives": FileArray(("point", "objective"), NUMBER, "objectives in the user's senses", "see objective_unit"),
+    "objective": FileArray(("objective",), TEXT, "name of the objective"),
+    "objective_unit": FileArray(("objective",), TEXT, "unit of the objective"),
+    "objective_sense": FileArray(("objective",), TEXT, "minimize or maximize"),
+    "objective_scale": FileArray(("objective",), NUMBER, "scale of the objective, NaN if none was stated", "see objective_unit"),
+    **{column.array: column.stored for column in COLUMNS.values() if column.stored},
+    "simulated_objectives": FileArray(
         ("point", "objective"), NUMBER, "objectives as simulated, in the user's senses", "see objective_unit", optional=True
     ),
-    "weights": Column(
+    "weights": FileArray(
         ("point", "objective"),
         NUMBER,
         "weights of the objectives, all minimised, in the sum to which costates belong, NaN without costates",
         "see objective_unit",
         optional=True,
     ),
-    "verified": Column(("point",), COUNT, "1 if the simulation agrees with the point, else 0", rows="verified", optional=True),
-    "transcription": Column(("point",), TEXT, "transcription of the point, as JSON"),
+    "transcription": FileArray(("point",), TEXT, "transcription of the point, as JSON"),
     **named_table("violations", "constraint", "scaled residual of the constraint", "constraint"),
     **named_table("excursions", "quantity", "by how much, scaled, the quantity leaves its bounds between nodes", "quantity"),
-    "parameters": Column(("point", "parameter"), NUMBER, "static decision variables", "see parameter_unit"),
-    "parameter": Column(("parameter",), TEXT, "name of the parameter"),
-    "parameter_unit": Column(("parameter",), TEXT, "unit of the parameter"),
-    "decision": Column(("point", "variable"), NUMBER, "decision vector, NaN where the point has no such variable", "see variable_unit"),
-    "place": Column(("point", "variable"), COUNT, "place of the variable in the point's own decision vector, -1 if it has none"),
+    "parameters": FileArray(("point", "parameter"), NUMBER, "static decision variables", "see parameter_unit"),
+    "parameter": FileArray(("parameter",), TEXT, "name of the parameter"),
+    "parameter_unit": FileArray(("parameter",), TEXT, "unit of the parameter"),
+    "decision": FileArray(("point", "variable"), NUMBER, "decision vector, NaN where the point has no such variable", "see variable_unit"),
+    "place": FileArray(("point", "variable"), COUNT, "place of the variable in the point's own decision vector, -1 if it has none"),
     **variable_table("variable", "entry of the decision vector"),
 }
 
-ARRAYS = {
-    "time": ("node",),
-    "states": ("node", "state"),
-    "controls": ("node", "control"),
-    "paths": ("node", "path"),
-    "edges": ("edge",),
-    "state_coefficients": ("element", "state_function", "state"),
-    "control_edges": ("control_edge",),
-    "control_coefficients": ("control_element", "control_function", "control"),
-}
-"""What a phase holds of each point. Between `edges`, the ends of the elements, states and controls are the sums of their coefficients times
-the functions of their basis (`state_basis`, `control_basis`) on [-1, 1]."""
-SPLIT = {"states": "state", "controls": "control", "paths": "path"}
-"""Those of them that are written as an array for each entry of their last dimension, by its own name."""
-LENGTHS = ("node", "edge", "element", "state_function", "control_edge", "control_element", "control_function")
-"""The dimensions in which points may differ; `<dimension>_count` (point) are the true lengths."""
+AT_NODES = {"state": "states", "control": "controls", "path": "paths"}
+"""Kinds of quantities that have an array each, and the attribute of a trajectory that has all of a kind at its nodes."""
+MEANING = (
+    "those of the sum of weights times objectives, all minimised; the weights (point, objective) in the root are not negative and of sum 1"
+    " in the objectives' own units"
+)
+"""Attribute `costates` of a phase that has some."""
+
+Names = Mapping[str, Sequence[str]]
+"""Names of the states, controls and path constraints of a phase, by their kind."""
 
 
-def phase_table(time_unit: str) -> dict[str, Column]:
+# Phases
+
+
+class Pieces(NamedTuple):
+    """The arrays of the piecewise polynomials of one kind of quantity, and their dimensions."""
+
+    kind: str
+    edges: str  # array of the ends of the elements
+    edge: str
+    element: str
+    entry: str
+
+    @property
+    def coefficients(self) -> str:
+        """Array (point, element, function, entry)."""
+        return f"{self.kind}_coefficients"
+
+    @property
+    def dimensions(self) -> tuple[str, str, str]:
+        """Those in which points may differ."""
+        return self.edge, self.element, f"{self.kind}_function"
+
+    def table(self, unit: str, of_entries: str) -> dict[str, FileArray]:
+        """The arrays, with the units of time and of coefficients."""
+        what, some = f"{self.kind}s", self is COSTATES
+        arrays = {
+            self.edges: (("point", self.edge), NUMBER, f"ends of the elements of the {what}", unit),
+            self.coefficients: (
+                *(("point", *self.dimensions[1:], self.entry), NUMBER),
+                *(f"coefficients of the {what} on each element, in the basis {self.kind}_basis", of_entries),
+            ),
+            f"{self.kind}_basis": (("point",), TEXT, f"basis of the {what} on [-1, 1]: {', '.join(BASES)}", "1"),
+        }
+        return {name: FileArray(*about, optional=some) for name, about in arrays.items()} | _counts_table(self.dimensions, some)
+
+    def write(self, several: Sequence[PiecewisePolynomial | None], entries: int) -> dict[str, np.ndarray]:
+        """The polynomials of all points as arrays."""
+        shapes = [(0, 0, 0) if one is None else (len(one.edges), *one.coefficients.shape[:2]) for one in several]
+        return {
+            self.edges: padded(_each(several, "edges"), (0,)),
+            self.coefficients: padded(_each(several, "coefficients"), (0, 0, entries)),
+            f"{self.kind}_basis": words(["" if one is None else one.basis for one in several]),
+            **_counts(self.dimensions, shapes),
+        }
+
+    def read(self, data: Labelled, phase: str, there: np.ndarray) -> list[PiecewisePolynomial | None]:
+        """The polynomials of the points of a mask `there` (n,); the others have none."""
+        counts = _read_counts(data, phase, self.dimensions, there)
+        if np.any(there & (counts[:, 0] != counts[:, 1] + 1)):
+            raise ValueError(f"phase '{phase}': '{self.edge}_count' is not that of its elements and 1")
+        edges, coefficients, bases = data[self.edges], data[self.coefficients], data[f"{self.kind}_basis"]
+        wrong = [word for word in bases[there] if word not in BASES]
+        if wrong:
+            raise ValueError(f"phase '{phase}': there is no basis '{wrong[0][:30]}'")
+        return [
+            PiecewisePolynomial(edges[i, :ends].copy(), coefficients[i, :elements, :functions].copy(), bases[i]) if there[i] else None
+            for i, (ends, elements, functions) in enumerate(counts.tolist())
+        ]
+
+
+STATES = Pieces("state", "edges", "edge", "element", "state")
+CONTROLS = Pieces("control", "control_edges", "control_edge", "control_element", "control")
+COSTATES = Pieces("costate", "costate_edges", "costate_edge", "costate_element", "state")
+
+
+def _counts_table(dimensions: Iterable[str], costates: bool = False) -> dict[str, FileArray]:
+    without = ", 0 without costates" if costates else ""
+    return {
+        f"{one}_count": FileArray(("point",), COUNT, f"number of entries of the point along {one}{without}", optional=costates)
+        for one in dimensions
+    }
+
+
+def _counts(dimensions: Sequence[str], shapes: Sequence[tuple[int, ...]]) -> dict[str, np.ndarray]:
+    return {f"{one}_count": np.array(column, dtype=int) for one, column in zip(dimensions, zip(*shapes, strict=True), strict=True)}
+
+
+def _read_counts(data: Labelled, phase: str, dimensions: Iterable[str], there: np.ndarray) -> np.ndarray:
+    """The lengths (n, dimensions) of points, at least 1 for those of a mask `there` (n,)."""
+    sizes, found = data.sizes, []
+    for dimension in dimensions:
+        count = data[f"{dimension}_count"]
+        if np.any((count < 0) | (count > sizes[dimension]) | (there & (count == 0))):
+            raise ValueError(f"phase '{phase}': '{dimension}_count' is not between 1 and {sizes[dimension]}")
+        found.append(count)
+    return np.stack(found, axis=1)
+
+
+def _each(items: Sequence[Any], attribute: str) -> list[Any]:
+    """An attribute of each item; None for None."""
+    return [None if item is None else getattr(item, attribute) for item in items]
+
+
+def phase_table(time_unit: str) -> dict[str, FileArray]:
     """The arrays of every phase."""
     unit = time_unit or "1"
-    described = {
-        "time": ("time of the node", unit),
-        "edges": ("ends of the elements of the states", unit),
-        "state_coefficients": ("coefficients of the states on each element, in the basis state_basis", "see state_unit"),
-        "control_edges": ("ends of the elements of the controls", unit),
-        "control_coefficients": ("coefficients of the controls on each element, in the basis control_basis", "see control_unit"),
-    }
     return {
-        **{name: Column(("point", *ARRAYS[name]), NUMBER, *described[name]) for name in described},
-        **{f"{dimension}_count": Column(("point",), COUNT, f"number of entries of the point along {dimension}") for dimension in LENGTHS},
-        "state_basis": Column(("point",), TEXT, f"basis of the states on [-1, 1]: {', '.join(BASES)}"),
-        "control_basis": Column(("point",), TEXT, f"basis of the controls on [-1, 1]: {', '.join(BASES)}"),
+        "time": FileArray(("point", "node"), NUMBER, "time of the node", unit),
+        **_counts_table(["node"]),
+        **STATES.table(unit, "see state_unit"),
+        **CONTROLS.table(unit, "see control_unit"),
         **variable_table("state", "state"),
         **variable_table("control", "control"),
         **variable_table("path", "path constraint", limits=True),
     }
 
 
-DIMENSIONS = {dimension for column in (*ROOT.values(), *phase_table("").values()) for dimension in column.dimensions}
+DIMENSIONS = {dimension for array in (*ROOT.values(), *phase_table("").values()) for dimension in array.dimensions}
 CLOSEST = "_closest"
 
 
@@ -141,31 +210,140 @@ def group_names(phases: Iterable[str]) -> dict[str, str]:
     return legal_names(phases, "phase", {CLOSEST, *ROOT, *DIMENSIONS})
 
 
-def quantity_names(names: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:
-    """The arrays of the states, controls and path constraints of a phase (the keys), by their names."""
+def quantity_names(names: Names) -> dict[str, list[str]]:
+    """The arrays of the states, controls and path constraints of a phase, by their kind."""
     taken = {*phase_table(""), *DIMENSIONS}
     found: dict[str, list[str]] = {}
-    for kind in SPLIT.values():
+    for kind in AT_NODES:
         found[kind] = list(legal_names(names[kind], kind, taken).values())
         taken |= {*found[kind]}
     return found
 
 
-def _taken(names: Mapping[str, Iterable[str]]) -> set[str]:
-    """The names of the arrays of a phase, but for those of its costates."""
-    return {*phase_table(""), *DIMENSIONS, *(array for arrays in quantity_names(names).values() for array in arrays)}
+class Layout:
+    """The arrays of one phase, from the names of its states, controls and path constraints, and their units."""
+
+    def __init__(self, names: Names, units: Names, time_unit: str) -> None:
+        self.quantities = quantity_names(names)
+        arrays = {array for those in self.quantities.values() for array in those}
+        wanted = [*(f"costate of {name}" for name in names["state"]), "hamiltonian"]
+        taken = {*phase_table(""), *DIMENSIONS, *arrays}
+        *self.costates, self.hamiltonian = legal_names(wanted, "costate", taken).values()
+        per, time = "weighted objectives", time_unit or "1"
+        error = "relative error of costates integrated backward, NaN for others"
+        self.of_costates = {
+            **{
+                array: FileArray(("point", "node"), NUMBER, f"costate of {state}", f"{per} per {unit}" if unit else per, optional=True)
+                for array, state, unit in zip(self.costates, names["state"], units["state"], strict=True)
+            },
+            self.hamiltonian: FileArray(("point", "node"), NUMBER, "Hamiltonian", f"{per} per {time}", optional=True),
+            **COSTATES.table(time, "as those of the costates"),
+            "costate_error": FileArray(("point",), NUMBER, error, optional=True),
+        }
+        of_quantities = {
+            array: FileArray(("point", "node"), NUMBER, name, unit or "1")
+            for kind in AT_NODES
+            for array, name, unit in zip(self.quantities[kind], names[kind], units[kind], strict=True)
+        }
+        self.table = phase_table(time_unit) | of_quantities | self.of_costates
 
 
-def _quantity_table(names: Mapping[str, Sequence[str]], units: Mapping[str, Sequence[str]]) -> dict[str, Column]:
-    arrays = quantity_names(names)
-    return {
-        array: Column(("point", "node"), NUMBER, name, unit or "1")
-        for kind in SPLIT.values()
-        for array, name, unit in zip(arrays[kind], names[kind], units[kind], strict=True)
-    }
+def write_phase(name: str, phases: Sequence[PhaseTrajectory | None], costates: Sequence[PhaseCostates | None]) -> Labelled:
+    """The trajectories and costates of one phase of all points, at least one of which has some."""
+    first = next(phase for phase in phases if phase is not None)
+    variables: dict[str, tuple[Variable, ...] | tuple[Limit, ...]]
+    variables = {"state": first.state_variables, "control": first.control_variables, "path": first.path_limits}
+    names = {kind: [v.name for v in those] for kind, those in variables.items()}
+    layout = Layout(names, {kind: [v.unit for v in those] for kind, those in variables.items()}, first.time_unit)
+    time = padded(_each(phases, "time"), (0,))
+    arrays = {"time": time, **_counts(["node"], [(0 if one is None else len(one.time),) for one in phases])}
+    for kind, attribute in AT_NODES.items():
+        values = padded(_each(phases, attribute), (0, len(names[kind])))
+        arrays |= {array: values[..., i] for i, array in enumerate(layout.quantities[kind])}
+        arrays |= variable_columns(variables[kind], kind, limits=kind == "path")
+    arrays |= STATES.write(_each(phases, "state"), len(names["state"])) | CONTROLS.write(_each(phases, "control"), len(names["control"]))
+    attrs = {"phase": name, "time_unit": first.time_unit}
+    if any(one is not None for one in costates):
+        values = padded(_each(costates, "at_nodes"), (time.shape[1], len(names["state"])))
+        arrays |= {array: values[..., i] for i, array in enumerate(layout.costates)}
+        arrays[layout.hamiltonian] = padded(_each(costates, "hamiltonian"), (time.shape[1],))
+        arrays |= COSTATES.write(_each(costates, "polynomial"), len(names["state"]))
+        arrays["costate_error"] = layout.table["costate_error"].of(_each(costates, "error"))
+        attrs["costates"] = MEANING
+    return labelled(layout.table, arrays, attrs)
 
 
-# Writing
+def read_phase(name: str, group: Group, points: int) -> tuple[list[PhaseTrajectory | None], list[PhaseCostates | None]]:
+    """The trajectories and costates of one phase from its group. Raises ValueError for what no phase can have."""
+    time_unit = read_attribute(group.attrs, "time_unit", str)
+    # The names of states, controls and path constraints are arrays themselves: they are needed to know which others there have to be.
+    names = {kind: group.arrays[kind].tolist() if kind in group.arrays else [] for kind in AT_NODES}
+    for kind, those in names.items():
+        if not all(isinstance(one, str) for one in those):
+            raise ValueError(f"'{kind}' has numbers, not texts")
+        distinct(those, f"entries of '{kind}' in phase '{name}'")
+    layout = Layout(names, {kind: [""] * len(those) for kind, those in names.items()}, time_unit)
+    data = checked(layout.table, group)
+    if data.sizes["point"] != points:
+        raise ValueError(f"phase '{name}' has {data.sizes['point']} points, the front has {points}")
+    there = data["node_count"] > 0
+    nodes = _read_counts(data, name, ["node"], there)[:, 0].tolist()
+    values = {kind: _joined(data, arrays) for kind, arrays in layout.quantities.items()}
+    state, control = STATES.read(data, name, there), CONTROLS.read(data, name, there)
+    states, controls, limits = read_variables(data, "state"), read_variables(data, "control"), read_limits(data, "path")
+    phases = [
+        None
+        if one is None or other is None
+        else PhaseTrajectory(
+            name=name,
+            time_unit=time_unit,
+            time=data["time"][i, :count].copy(),
+            **{attribute: values[kind][i, :count].copy() for kind, attribute in AT_NODES.items()},
+            state=one,
+            control=other,
+            state_variables=states,
+            control_variables=controls,
+            path_limits=limits,
+        )
+        for i, (count, one, other) in enumerate(zip(nodes, state, control, strict=True))
+    ]
+    return phases, _read_costates(data, name, layout, names["state"], nodes)
+
+
+def _joined(data: Labelled, arrays: Sequence[str]) -> np.ndarray:
+    """Arrays (point, node) as one (point, node, array)."""
+    return np.stack([data[array] for array in arrays], axis=-1) if arrays else np.empty((*data["time"].shape, 0))
+
+
+def _read_costates(data: Labelled, phase: str, layout: Layout, states: Sequence[str], nodes: list[int]) -> list[PhaseCostates | None]:
+    missing = [array for array in layout.of_costates if array not in data.arrays]
+    if len(missing) == len(layout.of_costates):
+        return [None] * len(nodes)
+    if missing:
+        raise ValueError(f"phase '{phase}': '{missing[0]}' is missing from it")
+    there = data["costate_element_count"] > 0
+    if np.any(there & (np.array(nodes) == 0)):
+        raise ValueError(f"phase '{phase}': a point has costates, and no nodes")
+    values, hamiltonian, errors = _joined(data, layout.costates), data[layout.hamiltonian], data["costate_error"].tolist()
+    return [
+        None
+        if one is None
+        else PhaseCostates(
+            tuple(states), values[i, :count].copy(), hamiltonian[i, :count].copy(), one, None if np.isnan(errors[i]) else errors[i]
+        )
+        for i, (count, one) in enumerate(zip(nodes, COSTATES.read(data, phase, there), strict=True))
+    ]
+
+
+def costates_of_point(weights: np.ndarray, phases: Mapping[str, PhaseCostates | None]) -> Costates | None:
+    """The costates of one point, from its weights (m,) and those of its phases. Raises ValueError if some of these are missing only."""
+    known = {name: one for name, one in phases.items() if one is not None}
+    if len(known) not in (0, len(phases)) or bool(known) != bool(np.isfinite(weights).all()):
+        raise ValueError("a point has costates in some phases only, or without weights")
+    return Costates(weights, known) if known else None
+
+
+# The root
 
 
 def root_dataset(front: Points) -> Labelled:
@@ -179,7 +357,7 @@ def root_dataset(front: Points) -> Labelled:
         "objective": words(front.names),
         "objective_unit": words(front.units),
         "objective_sense": words(front.senses),
-        "objective_scale": _numbers([goal.scale for goal in front.goals]),
+        "objective_scale": ROOT["objective_scale"].of([goal.scale for goal in front.goals]),
         "simulated_objectives": front.simulated_F * front.signs,
         "transcription": words([document(transcription) for transcription in front.transcriptions]),
         "parameters": np.array(values, dtype=float).reshape(len(front), len(names)),
@@ -194,9 +372,7 @@ def root_dataset(front: Points) -> Labelled:
     if any(one is not None for one in front.costates):
         none = np.full(len(front.goals), np.nan)
         arrays["weights"] = np.array([none if one is None else one.weights for one in front.costates])
-    for name, column in ROOT.items():
-        if column.rows:
-            arrays[name] = CONVERSIONS[column.kind](getattr(front, column.rows))
+    arrays |= {column.array: column.stored.of(getattr(front, name)) for name, column in COLUMNS.items() if column.stored}
     return labelled(ROOT, {name: arrays[name] for name in ROOT if name in arrays}, _attributes(front))
 
 
@@ -206,71 +382,11 @@ def phase_names(front: Points) -> list[str]:
 
 
 def phase_dataset(front: Points, name: str) -> Labelled:
-    """The trajectories of one phase, all points. Raises KeyError if there is no such phase."""
-    phases = [None if point.trajectory is None else point.trajectory[name] for point in front]
-    first = next((phase for phase in phases if phase is not None), None)
-    if first is None:
+    """The trajectories and costates of one phase, all points. Raises KeyError if there is no such phase."""
+    phases = [None if trajectory is None else trajectory[name] for trajectory in front.trajectories]
+    if all(phase is None for phase in phases):
         raise KeyError(f"no point has a phase '{name}'")
-    rows = [None if phase is None else _arrays(phase) for phase in phases]
-    tables = {array: padded([None if row is None else row[array] for row in rows], like.shape) for array, like in _arrays(first).items()}
-    variables: dict[str, tuple[Any, ...]]
-    variables = {"state": first.state_variables, "control": first.control_variables, "path": first.path_limits}
-    names = {kind: [v.name for v in those] for kind, those in variables.items()}
-    units = {kind: [v.unit for v in those] for kind, those in variables.items()}
-    arrays = split(tables, names)
-    arrays |= {f"{dimension}_count": _counts(rows, dimension) for dimension in LENGTHS}
-    arrays |= {
-        "state_basis": words(["" if phase is None else phase.state.basis for phase in phases]),
-        "control_basis": words(["" if phase is None else phase.control.basis for phase in phases]),
-        **variable_columns(first.state_variables, "state"),
-        **variable_columns(first.control_variables, "control"),
-        **variable_columns(first.path_limits, "path", limits=True),
-    }
-    table = phase_table(first.time_unit) | _quantity_table(names, units)
-    taken = _taken(names)
-    table |= costate_table(names["state"], units["state"], first.time_unit, taken)
-    costates = costate_columns(of_phase(front.costates, name), arrays["time"].shape[1], costate_names(names["state"], taken))
-    about = {"costates": MEANING} if costates else {}
-    return labelled(table, arrays | costates, {"phase": name, "time_unit": first.time_unit, **about})
-
-
-def split(arrays: Mapping[str, np.ndarray], names: Mapping[str, Iterable[str]]) -> dict[str, np.ndarray]:
-    """Arrays of a phase by name, those of `SPLIT` as one for each of their names."""
-    entries = quantity_names(names)
-    found = {name: values for name, values in arrays.items() if name not in SPLIT}
-    for name, kind in SPLIT.items():
-        found |= {entry: arrays[name][..., i] for i, entry in enumerate(entries[kind])}
-    return found
-
-
-def _numbers(values: Sequence[float | None]) -> np.ndarray:
-    return np.array([np.nan if value is None else value for value in values], dtype=float)
-
-
-def _whole(values: np.ndarray) -> np.ndarray:
-    return np.asarray(values, dtype=np.int32)
-
-
-CONVERSIONS: dict[str, Callable[[Any], np.ndarray]] = {TEXT: words, NUMBER: _numbers, COUNT: _whole}
-"""From columns of `Points` to arrays of a file, by their kind."""
-
-
-def _counts(rows: Sequence[Mapping[str, np.ndarray] | None], dimension: str) -> np.ndarray:
-    array, axis = next((name, dims.index(dimension)) for name, dims in ARRAYS.items() if dimension in dims)
-    return np.array([0 if row is None else row[array].shape[axis] for row in rows], dtype=int)
-
-
-def _arrays(phase: PhaseTrajectory) -> dict[str, np.ndarray]:
-    return {
-        "time": phase.time,
-        "states": phase.states,
-        "controls": phase.controls,
-        "paths": phase.paths,
-        "edges": phase.state.edges,
-        "state_coefficients": phase.state.coefficients,
-        "control_edges": phase.control.edges,
-        "control_coefficients": phase.control.coefficients,
-    }
+    return write_phase(name, phases, [None if one is None else one[name] for one in front.costates])
 
 
 def _places(front: Points) -> np.ndarray:
@@ -303,7 +419,7 @@ def root_columns(root: Labelled) -> dict[str, Any]:
     variables = read_variables(root, "variable")
     distinct(variables, "entries of the decision vector")
     own = [_own_columns(row) for row in root["place"]]
-    rows = {column.rows: root[name] for name, column in ROOT.items() if column.rows and name in root.arrays}
+    rows = {name: root[column.array] for name, column in COLUMNS.items() if column.array in root.arrays}
     signs = np.where(senses == "minimize", 1.0, -1.0)
     stats = read_stats(root.attrs)
     if "verify" not in stats and not np.isnan(rows.get("defect", np.nan)).all():
@@ -349,11 +465,9 @@ def _own_columns(places: np.ndarray) -> np.ndarray:
 
 def read_flights(root: Labelled, phases: Mapping[str, Group]) -> dict[str, Any]:
     """The points' trajectories and costates from the root and the groups of its phases, by their names; nothing if there are no phases."""
-    from transcription.trajectories.trajectory import Trajectory
-
     if not phases:
         return {}
-    columns, adjoints = zip(*(_read_phase(name, group, root.sizes["point"]) for name, group in phases.items()), strict=True)
+    columns, adjoints = zip(*(read_phase(name, group, root.sizes["point"]) for name, group in phases.items()), strict=True)
     names = root["parameter"].tolist()
     distinct(names, "parameters")
     found: list[Trajectory | None] = []
@@ -363,76 +477,5 @@ def read_flights(root: Labelled, phases: Mapping[str, Group]) -> dict[str, Any]:
             raise ValueError("a point has a trajectory in some phases only")
         found.append(Trajectory(known, dict(zip(names, parameters, strict=True))) if known else None)
     weights = root["weights"] if "weights" in root.arrays else np.full((len(found), len(root["objective"])), np.nan)
-    costates = [
-        whole(row, dict(zip(phases, several, strict=True))) for row, several in zip(weights, zip(*adjoints, strict=True), strict=True)
-    ]
-    return {"trajectories": found, "costates": costates}
-
-
-def _read_phase(name: str, group: Group, points: int) -> tuple[list[PhaseTrajectory | None], list[PhaseCostates | None]]:
-    from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial
-
-    time_unit = read_attribute(group.attrs, "time_unit", str)
-    # The names of states, controls and path constraints are arrays themselves: they are needed to know which others there have to be.
-    names = {kind: group.arrays[kind].tolist() if kind in group.arrays else [] for kind in SPLIT.values()}
-    for kind, those in names.items():
-        if not all(isinstance(one, str) for one in those):
-            raise ValueError(f"'{kind}' has numbers, not texts")
-        distinct(those, f"entries of '{kind}' in phase '{name}'")
-    table = phase_table(time_unit) | _quantity_table(names, {kind: [""] * len(those) for kind, those in names.items()})
-    taken = _taken(names)
-    table |= costate_table(names["state"], [""] * len(names["state"]), time_unit, taken)
-    data = checked(table, group)
-    if data.sizes["point"] != points:
-        raise ValueError(f"phase '{name}' has {data.sizes['point']} points, the front has {points}")
-    tables = {array: data[array] for array in ARRAYS if array not in SPLIT}
-    tables |= {array: _joined(data, entries) for array, entries in zip(SPLIT, quantity_names(names).values(), strict=True)}
-    states, controls = read_variables(data, "state"), read_variables(data, "control")
-    limits = read_limits(data, "path")
-    found: list[PhaseTrajectory | None] = []
-    for i, lengths in enumerate(_lengths(data, name)):
-        if not lengths["node"]:
-            found.append(None)
-            continue
-        array = {
-            key: tables[key][i][tuple(slice(lengths.get(dimension)) for dimension in dimensions)].copy()
-            for key, dimensions in ARRAYS.items()
-        }
-        phase = PhaseTrajectory(
-            name=name,
-            time_unit=time_unit,
-            time=array["time"],
-            states=array["states"],
-            controls=array["controls"],
-            paths=array["paths"],
-            state=PiecewisePolynomial(array["edges"], array["state_coefficients"], data["state_basis"][i]),
-            control=PiecewisePolynomial(array["control_edges"], array["control_coefficients"], data["control_basis"][i]),
-            state_variables=states,
-            control_variables=controls,
-            path_limits=limits,
-        )
-        found.append(phase)
-    nodes = [0 if one is None else len(one.time) for one in found]
-    return found, read_costates(data, name, names["state"], costate_names(names["state"], taken), nodes)
-
-
-def _joined(data: Labelled, entries: Sequence[str]) -> np.ndarray:
-    """Arrays of one quantity each, shape (point, node), as one (point, node, quantity)."""
-    return np.stack([data[entry] for entry in entries], axis=-1) if entries else np.empty((*data["time"].shape, 0))
-
-
-def _lengths(data: Labelled, name: str) -> list[dict[str, int]]:
-    """How long each dimension is for each point; 0 nodes for a point without a trajectory."""
-    counts = {dimension: data[f"{dimension}_count"] for dimension in LENGTHS}
-    there = counts["node"] > 0
-    for dimension, count in counts.items():
-        if np.any((count < 0) | (count > data.sizes[dimension]) | (there & (count == 0))):
-            raise ValueError(f"phase '{name}': '{dimension}_count' is not between 1 and {data.sizes[dimension]}")
-    for edge, element in (("edge", "element"), ("control_edge", "control_element")):
-        if np.any(there & (counts[edge] != counts[element] + 1)):
-            raise ValueError(f"phase '{name}': '{edge}_count' is not that of its elements and 1")
-    for basis in ("state_basis", "control_basis"):
-        wrong = [word for word, one in zip(data[basis], there, strict=True) if one and word not in BASES]
-        if wrong:
-            raise ValueError(f"phase '{name}': there is no basis '{wrong[0][:30]}'")
-    return [dict(zip(counts, row, strict=True)) for row in zip(*(count.tolist() for count in counts.values()), strict=True)]
+    by_point = [dict(zip(phases, several, strict=True)) for several in zip(*adjoints, strict=True)]
+    return {"trajectories": found, "costates": [costates_of_point(*one) for one in zip(weights, by_point, strict=True)]}

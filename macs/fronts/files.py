@@ -25,18 +25,18 @@ from ..io.netcdf import Group, Labelled, words
 from ..io.text import document
 from .columns import checked, read_attribute, read_document, variable_columns
 from .dataset import (
+    AT_NODES,
     CLOSEST,
     FORMAT,
     ROOT,
-    SPLIT,
     VERSION,
     group_names,
     phase_dataset,
     phase_names,
+    quantity_names,
     read_flights,
     root_columns,
     root_dataset,
-    split,
 )
 from .points import Points
 from .provenance import STATS, stats_attributes
@@ -158,13 +158,14 @@ def upgrade(root: Group, phases: dict[str, Group], version: int) -> tuple[Group,
             phase.arrays.update({basis: words([phase.attrs[basis]] * n) for basis in ("state_basis", "control_basis")})
     arrays["parameter_unit"] = words([""] * len(arrays["parameter"]))
     attrs |= stats_attributes(STATS | json.loads(attrs["stats"]))
-    upgraded = {}
-    for name, phase in phases.items():
-        names = {kind: phase.arrays[kind].tolist() for kind in SPLIT.values()}
-        empty = variable_columns((), "state") | variable_columns((), "control") | variable_columns((), "path", limits=True)
-        del empty["path_unit"]  # Limits had no units.
-        upgraded[name] = Group(empty | split(phase.arrays, names), phase.attrs, {})
-    return Group(variable_columns((), "variable") | arrays, attrs, {}), upgraded
+    for phase in phases.values():
+        entries = quantity_names({kind: phase.arrays[kind].tolist() for kind in AT_NODES})
+        for kind, attribute in AT_NODES.items():
+            values = phase.arrays.pop(attribute)
+            empty = variable_columns((), kind, limits=kind == "path")
+            empty.pop("path_unit", None)  # limits had no units
+            phase.arrays.update(empty | phase.arrays | {array: values[..., i] for i, array in enumerate(entries[kind])})
+    return Group(variable_columns((), "variable") | arrays, attrs, {}), phases
 
 
 def _reason(content: bytes, error: Exception) -> str:

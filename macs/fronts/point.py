@@ -15,7 +15,7 @@ from transcription.trajectories.simulate import Simulation, simulate
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.blackbox import Reevaluation, reevaluation
-from .provenance import Source
+from .provenance import ProblemSource
 
 
 class Point:
@@ -133,7 +133,7 @@ class Point:
         return self._points.notes[self.index]
 
     @property
-    def source(self) -> Source | None:
+    def source(self) -> ProblemSource | None:
         """Identity of the problem; None for a black box."""
         return self._points.source
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self, overload
+from typing import Any, NamedTuple, Self, overload
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from transcription.trajectories.costates import Costates
 from transcription.trajectories.trajectory import Trajectory
 
 from ..io.text import counted
+from .columns import COUNT, NUMBER, TEXT, FileArray
 from .point import Point, number
-from .provenance import STATS, AnyCompiled, Source, versions
+from .provenance import STATS, AnyCompiled, ProblemSource, versions
 
 
 def frozen(array: Any) -> np.ndarray:
@@ -30,15 +31,6 @@ def by_first(objectives: np.ndarray) -> np.ndarray:
     return np.lexsort(objectives.T[::-1])
 
 
-def column(values: Any, n: int, name: str) -> Any:
-    """The `values`, which must be n; n times None for None."""
-    if values is None:
-        return [None] * n
-    if len(values) != n:
-        raise ValueError(f"{name} has {len(values)} entries, F has {n} rows")
-    return values
-
-
 def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | None, ...]:
     """The dicts, with equal ones as one object."""
     distinct: list[dict[str, Any]] = []
@@ -50,6 +42,64 @@ def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | 
             distinct.append(known)
         found.append(known)
     return tuple(found)
+
+
+def _numbers(entries: Sequence[Any]) -> np.ndarray:
+    return frozen(np.asarray(entries, dtype=float))
+
+
+def _texts(entries: Sequence[Any]) -> np.ndarray:
+    return frozen(np.asarray(entries, dtype=str))
+
+
+def _flags(entries: Sequence[Any]) -> np.ndarray:
+    return frozen(np.asarray(entries, dtype=bool))
+
+
+def _notes(entries: Sequence[Any]) -> tuple[str, ...]:
+    return tuple(note or "" for note in entries)
+
+
+def _optional_numbers(entries: Sequence[Any]) -> tuple[float | None, ...]:
+    return tuple(number(value) for value in entries)
+
+
+class PointColumn(NamedTuple):
+    """A column of points with one entry for each of them."""
+
+    keep: Callable[[Sequence[Any]], Any]  # the column, from its entries
+    default: Any = None  # entry of a point for which there is none; of rows of objectives, of each of them
+    array: str = ""  # what it is called in a file, where it has its own array
+    stored: FileArray | None = None
+
+
+def _stored(array: str, kind: str, long_name: str, optional: bool = False) -> tuple[str, FileArray]:
+    return array, FileArray(("point",), kind, long_name, optional=optional)
+
+
+COLUMNS = {
+    "F": PointColumn(_numbers),
+    "violation": PointColumn(_numbers, np.nan, *_stored("violation", NUMBER, "largest scaled residual of any constraint")),
+    "status": PointColumn(_texts, "", *_stored("status", TEXT, "converged, infeasible, failed or timeout")),
+    "violations": PointColumn(tuple),
+    "trajectories": PointColumn(tuple),
+    "excursions": PointColumn(tuple),
+    "optimality": PointColumn(
+        _optional_numbers, None, *_stored("optimality", NUMBER, "scaled residual of Pareto optimality, NaN if not computed")
+    ),
+    "costates": PointColumn(tuple),
+    "notes": PointColumn(_notes, "", *_stored("note", TEXT, "remark on the point")),
+    "transcriptions": PointColumn(shared),
+    "defect": PointColumn(
+        _numbers, np.nan, *_stored("defect", NUMBER, "largest scaled difference of a simulated state, NaN if not simulated", True)
+    ),
+    "simulated_violation": PointColumn(
+        _numbers, np.nan, *_stored("simulated_violation", NUMBER, "largest scaled residual of any constraint as simulated", True)
+    ),
+    "simulated_F": PointColumn(_numbers, np.nan),
+    "verified": PointColumn(_flags, False, *_stored("verified", COUNT, "1 if the simulation agrees with the point, else 0", True)),
+}
+"""What points consist of besides their decision vectors: the one table behind `Points`, its selections, unions, and its file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,62 +158,31 @@ class Decisions:
 class Points:
     """Points of one problem as columns with one entry for each point.
 
-    Parameters
-    ----------
-    F : array (n, m)
-        Objectives, all minimised.
-    decision : n arrays
-        Decision vectors in the user's units.
-    violation, status : (n,)
-        Largest scaled residual of any constraint; "converged", "infeasible", "failed" or "timeout".
-    goals : tuple of Objective
-        The m objectives as the user stated them.
-    variables : tuple of Variable, or n of them
-        Variables of the decision vectors: the same for all points, or one tuple for each point.
-    violations : n dicts, optional
-        Scaled residual by constraint.
-    trajectories : n Trajectories, optional
-        None for black boxes, and for a point without a trajectory.
-    excursions, optimality : n dicts or None, n floats or None, optional
-        Excess, scaled, of quantities that leave their bounds between nodes; scaled residual of the conditions of Pareto optimality.
-    costates : n Costates or None, optional
-        Of points that are optimal.
-    notes : n str, optional
-        Remarks, for example why a mesh could not be refined enough.
-    defect, simulated_violation, simulated_F, verified : (n,), (n,), (n, m), (n,), optional
-        By a simulation: largest difference of a state from the transcription, in spans of its bounds; largest scaled residual of any
-        constraint; objectives, all minimised; whether these agree with the point within `stats["verify"]`. NaN and False without it.
-    transcriptions : dict, or n of them, optional
-        `{"method": ..., "settings": {...}}`: the transcription of all points, or one for each; None for black boxes.
-    problem : CompiledProblem, CompiledVectorProblem or Source, optional
-        None for black boxes.
-    solver : dict, optional
-        `{"name": ..., "settings": {...}}`.
-    stats : dict, optional
-        Costs of the points; missing entries of `STATS` are added.
-    message, closest : str and Point, optional
-        For an empty front: the reason, with the most violated constraint, and the least infeasible point.
-    sort : bool
-        Sort by the first objective, in the user's value; otherwise keep the order.
-
-    Attributes
-    ----------
-    F, violation, status, defect, simulated_violation, simulated_F, verified : read-only arrays
-    violations, trajectories, excursions, optimality, costates, notes, transcriptions : tuples of n
-        Points on one mesh share one dict of `transcriptions`.
-    source : Source or None
-        Identity of the problem, None for a black box.
-    variables : tuple of Variable (D)
-        All variables of all points. Those of one point, in the order of its decision vector, are `Point.variables`.
-    decision : array (n, D)
-        A column for each of `variables`; NaN if the point, on a mesh of its own, does not have the variable. `Point.decision` has no NaN.
+    They are made of `F`, `decision`, `variables`, `goals` and the columns of `COLUMNS`, each with n entries; those left out have their
+    defaults. `variables` are the same for all points, or one tuple for each; so are `transcriptions`. `sort`: by the first objective, in
+    the user's value; otherwise the order is kept. Missing entries of `stats` are those of `STATS`.
     """
 
-    ROWS = (
-        *("F", "violation", "status", "violations", "trajectories", "excursions", "optimality", "costates", "notes"),
-        *("transcriptions", "defect", "simulated_violation", "simulated_F", "verified"),
-    )
-    """Columns with one entry for each point, besides the decision vectors."""
+    goals: tuple[Objective, ...]  # the m objectives as the user stated them
+    F: np.ndarray  # (n, m), all minimised
+    violation: np.ndarray  # (n,): largest scaled residual of any constraint
+    status: np.ndarray  # (n,): "converged", "infeasible", "failed" or "timeout"
+    violations: tuple[Mapping[str, float] | None, ...]  # scaled residual by constraint
+    trajectories: tuple[Trajectory | None, ...]  # None for black boxes, and for a point without a trajectory
+    excursions: tuple[Mapping[str, float] | None, ...]  # excess, scaled, of quantities that leave their bounds between nodes
+    optimality: tuple[float | None, ...]  # scaled residual of the conditions of Pareto optimality
+    costates: tuple[Costates | None, ...]  # of points that are optimal
+    notes: tuple[str, ...]  # remarks, for example why a mesh could not be refined enough
+    transcriptions: tuple[dict[str, Any] | None, ...]  # {"method": ..., "settings": {...}}: one dict for points on one mesh
+    # By a simulation, NaN and False without one:
+    defect: np.ndarray  # (n,): largest difference of a state from the transcription, in spans of its bounds
+    simulated_violation: np.ndarray  # (n,)
+    simulated_F: np.ndarray  # (n, m)  # noqa: N815
+    verified: np.ndarray  # (n,): whether all of these agree with the point within `stats["verify"]`
+    source: ProblemSource | None  # identity of the problem; None for a black box
+    solver: dict[str, Any]  # {"name": ..., "settings": {...}}
+    stats: dict[str, Any]  # costs of the points
+    message: str  # of an empty front: why there is no point
 
     def __init__(
         self,
@@ -174,61 +193,56 @@ class Points:
         status: Any,
         goals: Sequence[Objective],
         variables: Sequence[Variable | Sequence[Variable]] = (),
-        violations: Sequence[Mapping[str, float] | None] | None = None,
-        trajectories: Sequence[Trajectory | None] | None = None,
-        excursions: Sequence[Mapping[str, float] | None] | None = None,
-        optimality: Sequence[float | None] | None = None,
-        costates: Sequence[Costates | None] | None = None,
-        notes: Sequence[str | None] | None = None,
-        transcriptions: Mapping[str, Any] | Sequence[Mapping[str, Any] | None] | None = None,
-        defect: Any = None,
-        simulated_violation: Any = None,
-        simulated_F: Any = None,
-        verified: Any = None,
-        problem: AnyCompiled | Source | None = None,
+        problem: AnyCompiled | ProblemSource | None = None,
         solver: Mapping[str, Any] | None = None,
         stats: Mapping[str, Any] | None = None,
         message: str = "",
         closest: Point | None = None,
         sort: bool = True,
+        **columns: Any,
     ):
         self.goals = tuple(goals)
         self.solver = dict(solver or {})
-        self.stats: dict[str, Any] = {**STATS, "failures": {}, "versions": versions(), **(stats or {})}
+        self.stats = {**STATS, "failures": {}, "versions": versions(), **(stats or {})}
         self.stats["failures"] = dict(self.stats["failures"])
         self.message = message
         self._closest = closest
-        self.source = Source.of(problem) if isinstance(problem, AnyCompiled) else problem
+        self.source = ProblemSource.of(problem) if isinstance(problem, AnyCompiled) else problem
         self._problem = problem if isinstance(problem, AnyCompiled) else None
 
         rows = np.asarray(F, dtype=float).reshape(-1, len(self.goals))
         n = len(rows)
-        order = by_first(rows * self.signs) if sort else np.arange(n)
-
-        def ordered(values: Any, name: str) -> list[Any]:
-            entries = column(values, n, name)
-            return [entries[i] for i in order]
-
-        def numbers(values: Any, name: str) -> np.ndarray:
-            return frozen(np.asarray(ordered(np.full(n, np.nan) if values is None else values, name), dtype=float))
-
-        self.F = frozen(rows[order])
-        self.violation = numbers(violation, "violation")
-        self.status = frozen(np.asarray(ordered(status, "status"), dtype=str))
+        order = (by_first(rows * self.signs) if sort else np.arange(n)).tolist()
+        columns |= {"violation": violation, "status": status}
+        unknown = columns.keys() - COLUMNS.keys()
+        if unknown:
+            raise TypeError(f"points have no column '{min(unknown)}'")
+        for name in COLUMNS:
+            entries = self._entries(name, rows if name == "F" else columns.get(name), n)
+            self._set(name, [entries[i] for i in order])
+        if len(decision) != n:
+            raise ValueError(f"decision has {len(decision)} entries, F has {n} rows")
         common = not len(variables) or isinstance(variables[0], Variable)
-        self._decisions = Decisions.of(ordered(decision, "decision"), variables if common else ordered(variables, "variables"))
-        given = [transcriptions] * n if isinstance(transcriptions, Mapping) else transcriptions
-        self.transcriptions = shared(ordered(given, "transcriptions"))
-        self.violations: tuple[Mapping[str, float] | None, ...] = tuple(ordered(violations, "violations"))
-        self.trajectories: tuple[Trajectory | None, ...] = tuple(ordered(trajectories, "trajectories"))
-        self.excursions: tuple[Mapping[str, float] | None, ...] = tuple(ordered(excursions, "excursions"))
-        self.optimality = tuple(number(value) for value in ordered(optimality, "optimality"))
-        self.costates: tuple[Costates | None, ...] = tuple(ordered(costates, "costates"))
-        self.notes = tuple(note or "" for note in ordered(notes, "notes"))
-        self.defect = numbers(defect, "defect")
-        self.simulated_violation = numbers(simulated_violation, "simulated_violation")
-        self.simulated_F = numbers(np.full(rows.shape, np.nan) if simulated_F is None else simulated_F, "simulated_F").reshape(rows.shape)
-        self.verified = frozen(np.asarray(ordered(np.zeros(n) if verified is None else verified, "verified"), dtype=bool))
+        if not common and len(variables) != n:
+            raise ValueError(f"variables has {len(variables)} entries, F has {n} rows")
+        self._decisions = Decisions.of([decision[i] for i in order], variables if common else [variables[i] for i in order])
+
+    def _entries(self, name: str, values: Any, n: int) -> Any:
+        """The n entries of a column."""
+        if values is None:
+            return [COLUMNS[name].default] * n
+        if isinstance(values, Mapping):
+            return [values] * n
+        if len(values) != n:
+            raise ValueError(f"{name} has {len(values)} entries, F has {n} rows")
+        return values
+
+    def _set(self, name: str, entries: Sequence[Any]) -> None:
+        """Set a column from its entries."""
+        values = COLUMNS[name].keep(entries)
+        if name in ("F", "simulated_F") and values.ndim < 2:  # none, or those that are not simulated
+            values = frozen(np.tile(values[:, None], (1, len(self.goals))))
+        setattr(self, name, values)
 
     @property
     def signs(self) -> np.ndarray:
@@ -342,13 +356,13 @@ class Points:
         index = np.asarray(rows, dtype=int)
         taken = self._copy()
         taken._decisions = self._decisions.take(index)
-        for name in self.ROWS:
+        for name in COLUMNS:
             entries = getattr(self, name)
             setattr(taken, name, frozen(entries[index]) if isinstance(entries, np.ndarray) else tuple(entries[i] for i in index))
         return taken
 
     def replace(self, **changes: Any) -> Self:
-        """The same points with other columns of `ROWS`, or another problem, solver, stats, message or closest.
+        """The same points with other columns of `COLUMNS`, or another problem, solver, stats, message or closest.
 
         Raises
         ------
@@ -357,11 +371,10 @@ class Points:
         """
         changed = self._copy()
         for name, value in changes.items():
-            if name in self.ROWS:
-                entries = column(value, len(self), name)
-                setattr(changed, name, frozen(entries) if isinstance(getattr(self, name), np.ndarray) else tuple(entries))
+            if name in COLUMNS:
+                changed._set(name, self._entries(name, value, len(self)))
             elif name == "problem":
-                changed._problem, changed.source = value, Source.of(value)
+                changed._problem, changed.source = value, ProblemSource.of(value)
             elif name == "closest":
                 changed._closest = value
             elif name in ("solver", "stats", "message"):
@@ -378,7 +391,7 @@ class Points:
     def concatenate(cls, several: Sequence[Points]) -> Self:
         """The points of several sets, one after the other; all other data are those of the first set whose problem is known."""
         known = next((points for points in several if points.problem is not None), several[0])
-        all_rows: dict[str, Any] = {name: [entry for points in several for entry in getattr(points, name)] for name in cls.ROWS}
+        all_rows: dict[str, Any] = {name: [entry for points in several for entry in getattr(points, name)] for name in COLUMNS}
         every = [point for points in several for point in points]
         return cls(
             **all_rows,

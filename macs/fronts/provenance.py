@@ -26,7 +26,7 @@ AnyCompiled = CompiledProblem | CompiledVectorProblem
 
 
 @dataclass(frozen=True)
-class Source:
+class ProblemSource:
     """Identity of a problem: its name, its fingerprint, and the address and data that `problems.load` makes it from.
 
     `address` is empty where a script stated the problem; then only the script can give it again. To load a problem runs the code at its
@@ -42,7 +42,7 @@ class Source:
     """Whether it is a vector problem, which has no dynamics."""
 
     @classmethod
-    def of(cls, problem: AnyCompiled) -> Source:
+    def of(cls, problem: AnyCompiled) -> ProblemSource:
         vector = isinstance(problem, CompiledVectorProblem)
         return cls(problem.name, problem.fingerprint, problem.address, dict(problem.data), trusted=True, vector=vector)
 
@@ -191,7 +191,7 @@ VECTOR = "vector"
 """What the attribute `problem_kind` says of a vector problem; other problems do not have it."""
 
 
-def source_attributes(source: Source | None) -> dict[str, str]:
+def source_attributes(source: ProblemSource | None) -> dict[str, str]:
     """A source, without its address if the data that it takes cannot be written down: then the problem has to be passed again."""
     if source is None:
         return {"problem": "", "fingerprint": "", "address": "", "data": "{}"}
@@ -226,8 +226,8 @@ def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
     return stats
 
 
-def read_source(attrs: Mapping[str, Any]) -> Source | None:
+def read_source(attrs: Mapping[str, Any]) -> ProblemSource | None:
     """A source from its attributes; None for a black box, which has no fingerprint. Raises ValueError for what it cannot be."""
     name, fingerprint, address = (read_attribute(attrs, key, str) for key in ("problem", "fingerprint", "address"))
     vector = attrs.get("problem_kind", "") == VECTOR
-    return Source(name, fingerprint, address, read_document(attrs, "data"), vector=vector) if fingerprint else None
+    return ProblemSource(name, fingerprint, address, read_document(attrs, "data"), vector=vector) if fingerprint else None

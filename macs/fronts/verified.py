@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from transcription.trajectories.limits import excess
 from transcription.trajectories.simulate import Simulation, simulate_all, simulate_elements, worst_violation
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.blackbox import check_same_vectors, evaluated_again
+from ..evaluation.blackbox import evaluated_again
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..pareto.dominance import CONSTANT, objective_units, stated_scales
 from .points import Points
@@ -60,6 +60,40 @@ class Simulations:
         self._kept[id(trajectory)] = trajectory, simulation
 
 
+class Independent(NamedTuple):
+    """What an independent simulation, or another evaluation of a vector problem, gives for n points; NaN for those without any."""
+
+    F: np.ndarray  # (n, m), all minimised
+    defect: np.ndarray  # (n,): largest difference of a state, in spans of its bounds
+    violation: np.ndarray  # (n,)
+    worst: list[str]  # the constraint that each point violates most
+    violations: Sequence[Mapping[str, float] | None]  # of all constraints
+
+    def off(self, points: Points, scales: np.ndarray) -> np.ndarray:
+        """Differences (n, m) of objectives, in `scales` (m,)."""
+        found = np.abs(self.F - points.F) / scales
+        return np.where(np.isfinite(found), found, np.inf)
+
+
+def simulated_independently(points: Points, simulate: Callable[[list[Trajectory]], Sequence[Simulation]]) -> Independent:
+    """The points as `simulate` gives them."""
+    problem, (n, m) = points.compiled(), points.F.shape
+    found = Independent(np.full((n, m), np.nan), np.full(n, np.nan), np.full(n, np.nan), [""] * n, points.violations)
+    flown = {i: trajectory for i, trajectory in enumerate(points.trajectories) if trajectory is not None}
+    for i, simulation in zip(flown, simulate([*flown.values()]), strict=True):
+        found.worst[i], found.violation[i] = worst_violation(problem, simulation)
+        found.defect[i], found.F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
+    return found
+
+
+def evaluated_independently(points: Points) -> Independent:
+    """The points of a vector problem, evaluated again in one batch."""
+    problem = points.stated()
+    assert isinstance(problem, CompiledVectorProblem)
+    F, violation, violations = evaluated_again(problem, points.decision)
+    return Independent(F, np.zeros(len(F)), violation, [max(one, key=lambda name: one[name], default="") for one in violations], violations)
+
+
 def verified(
     points: Kind,
     tolerance: float | None,
@@ -67,91 +101,75 @@ def verified(
     remark: bool = True,
     simulations: Simulations | None = None,
 ) -> Kind:
-    """The same points with the columns of a simulation, and with a note where it does not agree.
+    """The same points with the columns of a simulation, or of another evaluation, and with a note where it does not agree.
 
     A point is verified if its simulated states differ from those of the transcription by at most `tolerance` at the ends of elements, in
     spans of their bounds, if the simulated trajectory and its controls violate no constraint by more, in `verified_scale`, and if no
-    simulated objective differs by more, in `objective_scales`. scales (m,).
+    simulated objective differs by more, in `objective_scales` or `scales` (m,). Points of a vector problem may violate as much as the
+    search allowed; their rows are counted in `stats["evaluated_again"]`.
     """
     check_verify(tolerance)
     if tolerance is None or points.source is None:
         return points
-    if points.source.vector:
-        return _verified_rows(points, tolerance)
-    rows = np.array([i for i, trajectory in enumerate(points.trajectories) if trajectory is not None], dtype=int)
-    problem, planned = points.compiled(), [trajectory for trajectory in points.trajectories if trajectory is not None]
+    vector = points.source.vector
     try:
-        made = (simulations or Simulations(problem, tolerance))(planned)
+        if vector:
+            found = evaluated_independently(points)
+        else:
+            found = simulated_independently(points, simulations or Simulations(points.compiled(), tolerance))
     except Stopped:
         return points
     scales = objective_scales(points) if scales is None else scales
-    n, m = points.F.shape
-    defect, violation, F, agrees = np.full(n, np.nan), np.full(n, np.nan), np.full((n, m), np.nan), np.zeros(n, dtype=bool)
+    off, allowed = found.off(points, scales), _allowed(points, tolerance)
+    agrees = (points.status == CONVERGED) & (found.defect <= tolerance) & (found.violation <= allowed) & (off <= tolerance).all(axis=1)
     notes = [_without_misses(note) for note in points.notes]
-    for i, trajectory, simulation in zip(rows, planned, made, strict=True):
-        worst, violation[i] = worst_violation(problem, simulation)
-        defect[i], F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
-        off = missed(simulation, points[int(i)].objectives, scales)
-        agrees[i] = points.status[i] == CONVERGED and max(defect[i], violation[i], off) <= tolerance
-        if not agrees[i]:
-            apart = np.abs(F[i] - points.F[i])
-            k = int(np.where(np.isfinite(apart), apart / scales, np.inf).argmax())
-            other = "" if off <= tolerance else f"its '{points.names[k]}' differs by {apart[k]:.2g} {points.goals[k].unit}".rstrip()
-            reasons = _misses(problem, trajectory, defect[i], (worst, violation[i]), other, tolerance, remark)
-            notes[i] = "; ".join([*filter(None, [notes[i]]), *reasons])
+    for i in np.flatnonzero(~agrees & ~np.isnan(found.violation)):
+        reasons = _misses(points, int(i), found, off[i], tolerance, allowed, remark)
+        if reasons:
+            notes[i] = "; ".join([*filter(None, [notes[i]]), (AGAIN if vector else MISSES) + ", ".join(reasons)])
     return points.replace(
-        defect=defect,
-        simulated_violation=violation,
-        simulated_F=F,
+        violations=found.violations,
+        defect=found.defect,
+        simulated_violation=found.violation,
+        simulated_F=found.F,
         verified=agrees,
         notes=notes,
-        stats={**points.stats, "verify": float(tolerance)},
+        stats={**points.stats, "verify": float(tolerance), **(_more_rows(points, len(points)) if vector else {})},
     )
 
 
-def _verified_rows(points: Kind, tolerance: float) -> Kind:
-    """Points of a vector problem, marked by an evaluation of all of them again, in one batch.
-
-    A point is verified if none of its objectives differs by more than `tolerance`, in `objective_scales`, and it violates nothing by more
-    than that or what the search allowed. The rows are counted in `stats["evaluated_again"]`.
-    """
-    problem = points.stated()
-    assert isinstance(problem, CompiledVectorProblem)
-    F, violation, violations = evaluated_again(problem, points.decision)
-    scales = objective_scales(points)
-    apart = np.abs(F - points.F) / scales
-    off = np.where(np.isfinite(apart), apart, np.inf)
-    allowed = max(tolerance, points.stats["tolerance"])
-    agrees = (points.status == CONVERGED) & (off <= tolerance).all(axis=1) & (violation <= allowed)
-    notes = [_without_misses(note) for note in points.notes]
-    for i in np.flatnonzero(~agrees):
-        found = []
-        if not np.isfinite(F[i]).all():
-            found.append("it fails")
-        elif not (off[i] <= tolerance).all():
-            k = int(off[i].argmax())
-            found.append(f"its '{points.names[k]}' differs by {off[i, k] * scales[k]:.2g} {points.goals[k].unit}".rstrip())
-        if allowed < violation[i] < np.inf:
-            worst = max(violations[i], key=lambda name: violations[i][name])
-            found.append(f"it violates {worst} by {violation[i]:.1e}")
-        notes[i] = "; ".join(filter(None, [notes[i], AGAIN + ", ".join(found) if found else ""]))
-    return points.replace(
-        violations=violations,
-        defect=np.zeros(len(points)),
-        simulated_violation=violation,
-        simulated_F=F,
-        verified=agrees,
-        notes=notes,
-        stats={**points.stats, "verify": float(tolerance), **_more_rows(points, len(points))},
-    )
+def _allowed(points: Points, tolerance: float) -> float:
+    """How much a verified point may violate constraints."""
+    return tolerance if points.dynamic else max(tolerance, points.stats["tolerance"])
 
 
-def feasible_when_simulated(points: Points, tolerance: float) -> np.ndarray:
+def _misses(points: Points, i: int, found: Independent, off: np.ndarray, tolerance: float, allowed: float, remark: bool) -> list[str]:
+    """In words, what point i misses by more than the tolerance."""
+    if points.dynamic and not np.isfinite(found.defect[i]):
+        return ["its states grow beyond all numbers, or their rates are no numbers somewhere along it"]
+    if not points.dynamic and not np.isfinite(found.F[i]).all():
+        return ["it fails"]
+    reasons = []
+    if not found.defect[i] <= tolerance:
+        unstable = _growing(points.compiled(), points.trajectories[i], tolerance) if remark else ""
+        reasons.append(f"its states differ by {found.defect[i]:.1e} of their bounds{unstable}")
+    if not found.violation[i] <= allowed:
+        reasons.append(f"it violates {found.worst[i]} by {found.violation[i]:.1e}")
+    if not off.max() <= tolerance:
+        k = int(np.where(np.isfinite(off), off, -1.0).argmax())
+        reasons.append(f"its '{points.names[k]}' differs by {abs(found.F[i, k] - points.F[i, k]):.2g} {points.goals[k].unit}".rstrip())
+    return reasons
+
+
+def feasible_as_simulated(points: Points, tolerance: float) -> np.ndarray:
     """Mask (n,) of the points that are verified but for what they say of their objectives, whose simulated values take their place."""
-    if not points.dynamic:
-        tolerance = max(tolerance, points.stats["tolerance"])
     numbers = np.isfinite(points.simulated_F).all(axis=1)
-    return (points.status == CONVERGED) & numbers & (points.defect <= tolerance) & (points.simulated_violation <= tolerance)
+    return (
+        (points.status == CONVERGED)
+        & numbers
+        & (points.defect <= tolerance if points.dynamic else True)
+        & (points.simulated_violation <= _allowed(points, tolerance))
+    )
 
 
 def with_nearest(points: Kind) -> Kind:
@@ -221,37 +239,15 @@ def _variation(points: Points) -> tuple[np.ndarray, np.ndarray]:
     return F, least
 
 
-def missed(simulation: Simulation, objectives: Mapping[str, float], scales: np.ndarray) -> float:
-    """The largest difference between a point's objectives, by name, and those of its simulation, divided by `scales` (m,)."""
-    difference = np.abs([simulation.objectives[name] - value for name, value in objectives.items()])
-    return float(np.where(np.isfinite(difference), difference / scales, np.inf).max())
-
-
 def largest_miss(problem: CompiledProblem, simulation: Simulation, F: np.ndarray, scales: np.ndarray) -> float:
     """The largest of all that a feasible point with objectives F (m,), all minimised, misses when it is simulated; see `verified`."""
-    values = {goal.name: float(value) for goal, value in zip(problem.goals, F * problem.signs, strict=True)}
-    return max(simulation.max_defect, worst_violation(problem, simulation)[1], missed(simulation, values, scales))
+    off = np.abs(np.array(list(simulation.objectives.values())) * problem.signs - F) / scales
+    return max(simulation.max_defect, worst_violation(problem, simulation)[1], float(np.where(np.isfinite(off), off, np.inf).max()))
 
 
-def _misses(
-    problem: CompiledProblem, trajectory: Trajectory, defect: float, worst: tuple[str, float], other: str, tolerance: float, remark: bool
-) -> list[str]:
-    """In words, what a point misses by more than the tolerance; `other` of its objectives."""
-    label, violation = worst
-    if not np.isfinite(defect):
-        return [f"{MISSES}its states grow beyond all numbers, or their rates are no numbers somewhere along it"]
-    found = []
-    if not defect <= tolerance:
-        found.append(f"its states differ by {defect:.1e} of their bounds{_growing(problem, trajectory, tolerance) if remark else ''}")
-    if not violation <= tolerance:
-        found.append(f"it violates {label} by {violation:.1e}")
-    if other:
-        found.append(other)
-    return [MISSES + ", ".join(found)] if found else []
-
-
-def _growing(problem: CompiledProblem, trajectory: Trajectory, tolerance: float) -> str:
+def _growing(problem: CompiledProblem, trajectory: Trajectory | None, tolerance: float) -> str:
     """A remark if each element by itself is right, so that small errors grow until the end: then no finer mesh can help."""
+    assert trajectory is not None
     rtol, atol = accuracy(PART * tolerance)
     try:
         own = simulate_elements(problem, trajectory, rtol=rtol, atol=atol).max_defect
@@ -279,51 +275,32 @@ def simulated(
     if not (tolerance >= 0):
         raise ValueError(f"tolerance must not be negative, not {tolerance!r}")
     stated = front.stated()
-    if isinstance(stated, CompiledVectorProblem):
-        other = stated if problem is None else check_same_vectors(stated, problem.compile())
-        return _simulated_rows(front, other, tolerance)
-    known = front.compiled()
-    if problem is None:
-        compiled = known
+    given = stated if problem is None else problem.compile()
+    check_alike(stated, given)
+    columns: dict[str, Any] = {}
+    violations: Sequence[Mapping[str, float]]
+    if isinstance(given, CompiledVectorProblem):
+        F, violation, violations = evaluated_again(given, front.decision)
+        otherwise = np.where(np.isfinite(violation), INFEASIBLE, FAILED)
     else:
-        given = problem.compile()
-        check_alike(known, given)
-        assert isinstance(given, CompiledProblem)
-        compiled = given
-    missing = [point for point in front if point.trajectory is None]
-    if missing:
-        raise ValueError(f"point {missing[0].index} has no trajectory to simulate: its status is '{missing[0].status}'")
-    planned = [trajectory for trajectory in front.trajectories if trajectory is not None]
-    found = simulate_all(compiled, planned, rtol=rtol, atol=atol, method=method)
-    violations = [_larger(one.violations, _decided(plan, compiled)) for one, plan in zip(found, planned, strict=True)]
-    F = np.array([list(one.objectives.values()) for one in found]).reshape(len(front), len(compiled.signs)) * compiled.signs
-    violation = np.array([max(one.values(), default=0.0) for one in violations])
+        planned = [trajectory for trajectory in front.trajectories if trajectory is not None]
+        if len(planned) < len(front):
+            index = front.trajectories.index(None)
+            raise ValueError(f"point {index} has no trajectory to simulate: its status is '{front[index].status}'")
+        found = simulate_all(given, planned, rtol=rtol, atol=atol, method=method)
+        F = np.array([list(one.objectives.values()) for one in found]).reshape(len(front), len(given.signs)) * given.signs
+        violations = [_larger(one.violations, _decided(plan, given)) for one, plan in zip(found, planned, strict=True)]
+        violation, otherwise = np.array([max(one.values(), default=0.0) for one in violations]), np.full(len(front), INFEASIBLE)
+        columns = {"trajectories": [one.trajectory for one in found], "optimality": None, "costates": None}
     plain = unmarked(front)
     return plain.replace(
         F=F,
         violation=violation,
         violations=violations,
-        status=np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, INFEASIBLE),
-        trajectories=[one.trajectory for one in found],
-        optimality=[None] * len(front),
-        costates=[None] * len(front),
-        problem=compiled,
+        status=np.where((violation <= tolerance) & np.isfinite(F).all(axis=1), CONVERGED, otherwise),
+        problem=given,
         stats={**plain.stats, "tolerance": float(tolerance)},
-    )
-
-
-def _simulated_rows(front: Points, problem: CompiledVectorProblem, tolerance: float) -> Points:
-    """The points of a vector problem, evaluated again with this one."""
-    F, violation, violations = evaluated_again(problem, front.decision)
-    plain = unmarked(front)
-    failed = ~np.isfinite(violation)
-    return plain.replace(
-        F=F,
-        violation=violation,
-        violations=violations,
-        status=np.where(failed, FAILED, np.where(violation <= tolerance, CONVERGED, INFEASIBLE)),
-        problem=problem,
-        stats={**plain.stats, "tolerance": float(tolerance)},
+        **columns,
     )
 
 
@@ -354,24 +331,28 @@ def _decided(planned: Trajectory, problem: CompiledProblem) -> dict[str, float]:
 
 def check_alike(known: AnyCompiled, other: AnyCompiled) -> None:
     """Raise ValueError unless points of the known problem can be simulated, or evaluated again, with the other."""
-    if isinstance(known, CompiledVectorProblem):
-        check_same_vectors(known, other)
-        return
-    if isinstance(other, CompiledVectorProblem):
-        raise ValueError(f"points of '{known.name}' cannot be simulated: {without_dynamics(other.name)}")
-
-    def parts(problem: CompiledProblem) -> dict[str, list[str]]:
-        named = {
-            f"{kind} of phase '{phase.name}'": [v.name for v in variables]
-            for phase in problem.phases
-            for kind, variables in (("states", phase.states), ("controls", phase.controls))
-        }
-        phases, parameters = [phase.name for phase in problem.phases], [v.name for v in problem.parameters]
-        objectives = [f"{goal.sense} {goal.name} [{goal.unit}]" for goal in problem.goals]
-        return {"phases": phases, "parameters": parameters, "objectives": objectives, **named}
-
-    ours, theirs = parts(known), parts(other)
+    vector = isinstance(known, CompiledVectorProblem)
+    place = f"points of '{known.name}' cannot be {'evaluated' if vector else 'simulated'}"
+    if vector != isinstance(other, CompiledVectorProblem):
+        raise ValueError(
+            f"{place} with '{other.name}': that is no vector problem" if vector else f"{place}: {without_dynamics(other.name)}"
+        )
+    ours, theirs = _parts(known), _parts(other)
     for what, names in ours.items():
         if theirs.get(what) != names:
             there, here = (", ".join(listed) or "none" for listed in (theirs.get(what, []), names))
-            raise ValueError(f"points of '{known.name}' cannot be simulated with '{other.name}': its {what} are {there}, not {here}")
+            raise ValueError(f"{place} with '{other.name}': its {what} are {there}, not {here}")
+
+
+def _parts(problem: AnyCompiled) -> dict[str, list[str]]:
+    """Names of all that two problems need to share."""
+    objectives = {"objectives": [f"{goal.sense} {goal.name} [{goal.unit}]" for goal in problem.goals]}
+    if isinstance(problem, CompiledVectorProblem):
+        return {"variables": [v.name for v in problem.variables], **objectives}
+    named = {
+        f"{kind} of phase '{phase.name}'": [v.name for v in variables]
+        for phase in problem.phases
+        for kind, variables in (("states", phase.states), ("controls", phase.controls))
+    }
+    phases, parameters = [phase.name for phase in problem.phases], [v.name for v in problem.parameters]
+    return {"phases": phases, "parameters": parameters, **objectives, **named}

@@ -13,7 +13,7 @@ from typing import Any
 
 import problems
 from macs.front import Front
-from macs.fronts.provenance import Source
+from macs.fronts.provenance import ProblemSource
 from macs.io.atomic import check_target, read_whole
 from macs.solvers.start import STARTS
 from problems.checks import unknown
@@ -39,7 +39,7 @@ def load_problem(address: str, **data: Any) -> Any:
     return problem
 
 
-def problem_of(source: Source | None, address: str) -> Any:
+def problem_of(source: ProblemSource | None, address: str) -> Any:
     """The problem that the user names for a front or a dialogue: with the data of its own, if it is from a function of the same name."""
     same = source is not None and source.address.rpartition(":")[2] == address.rpartition(":")[2]
     return load_problem(address, **(dict(source.data) if source is not None and same else {}))

@@ -11,7 +11,7 @@ import numpy as np
 
 from macs.front import Front
 from macs.fronts.points import by_first
-from macs.fronts.verified import feasible_when_simulated
+from macs.fronts.verified import feasible_as_simulated
 from macs.io.text import counted
 from macs.pareto.dominance import nondominated
 
@@ -57,7 +57,7 @@ class Counting:
         with errors_begin_with(f"the points of run {run.number} of {run.cell.name} cannot be simulated"):
             front = front if front.stats.get("verify") == tolerance else front.verify(tolerance)
             final = final if not front.dynamic or lengths == {len(front)} else record(front, tolerance)["ends"]
-        feasible = feasible_when_simulated(front, tolerance)
+        feasible = feasible_as_simulated(front, tolerance)
         rows = np.flatnonzero(feasible)
         rows = rows[nondominated(front.simulated_F[rows])]
         rows = rows[by_first(front.simulated_F[rows] * front.signs)]

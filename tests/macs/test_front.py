@@ -11,7 +11,7 @@ from synthetic_fronts import black_box, compiled, empty, flights, state_problem
 
 from macs.front import Front
 from macs.fronts.point import Point
-from macs.fronts.provenance import Source
+from macs.fronts.provenance import ProblemSource
 from macs.io.text import duration, numbers
 from macs.pareto.dominance import nondominated
 from problems.compiled import Variable
@@ -86,14 +86,14 @@ def test_a_black_box_has_no_trajectory_and_its_errors_name_the_reason():
 
 
 def test_the_error_of_an_unknown_problem_names_the_argument_to_pass():
-    front = flights(problem=Source("two legs", "0" * 32))
+    front = flights(problem=ProblemSource("two legs", "0" * 32))
     with pytest.raises(ValueError, match=r"'two legs' was stated in a script.*problem=problem"):
         front[0].simulate()
 
 
 def test_a_problem_that_changed_is_not_simulated(monkeypatch):
     monkeypatch.setattr("problems.load", lambda name, **data: state_problem(speed=4.0))
-    front = flights(problem=Source("two legs", compiled().fingerprint, "two_legs", trusted=True))
+    front = flights(problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", trusted=True))
     with pytest.raises(ValueError, match="belongs to problem 'two legs'"):
         front[0].simulate()
 
@@ -101,7 +101,7 @@ def test_a_problem_that_changed_is_not_simulated(monkeypatch):
 def test_the_problem_is_found_by_its_address_once(monkeypatch):
     calls = []
     monkeypatch.setattr("problems.load", lambda name, **data: calls.append((name, data)) or state_problem())
-    front = flights(problem=Source("two legs", compiled().fingerprint, "two_legs", {"a": 1}, trusted=True))
+    front = flights(problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"a": 1}, trusted=True))
     assert front.problem is None
     assert front.compiled() is front.compiled()
     assert calls == [("two_legs", {"a": 1})]

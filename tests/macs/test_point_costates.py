@@ -216,10 +216,10 @@ def test_a_file_without_any_has_no_array_of_them(ascents):
 @pytest.mark.parametrize(
     ("name", "change", "why"),
     [
-        ("ascent/costate_edge_count", 3, "elements of its costates"),
-        ("ascent/costate_element_count", -1, "elements of its costates"),
-        ("ascent/costate_function_count", 99, "elements of its costates"),
-        ("ascent/costate_basis", "fourier", "no known basis"),
+        ("ascent/costate_edge_count", 3, "'costate_edge_count' is not that of its elements"),
+        ("ascent/costate_element_count", -1, "'costate_element_count' is not between"),
+        ("ascent/costate_function_count", 99, "'costate_function_count' is not between"),
+        ("ascent/costate_basis", "fourier", "there is no basis 'fourier'"),
         ("ascent/hamiltonian", None, "'hamiltonian' is missing"),
         ("ascent/costate_of_y", None, "'costate_of_y' is missing"),
         ("weights", np.nan, "without weights"),

@@ -12,7 +12,7 @@ from misbehaving import Plain
 from test_study import Inline
 
 from macs import Front
-from macs.fronts.provenance import Source
+from macs.fronts.provenance import ProblemSource
 from problems.catalogue import CASES, is_catalogued
 from runs import Study
 from runs.batch.store import Store
@@ -97,7 +97,7 @@ def test_the_catalogue_needs_no_trust():
 def test_a_run_file_runs_no_code_of_its_own(mark, out, capsys, address):
     path = next(out.rglob("*.nc"))
     front = Front.load(path)
-    front.source = Source(front.source.name, front.source.fingerprint, address, {"command": "touch it_ran"})
+    front.source = ProblemSource(front.source.name, front.source.fingerprint, address, {"command": "touch it_ran"})
     front.save(path)
     record = path.with_suffix(".json")
     forged = {**from_record(record.read_bytes()), "front": crc32(path.read_bytes()), "simulated": {}}
@@ -194,7 +194,7 @@ def test_damaged_records_are_refused_or_the_same(made, tmp_path):
 def test_a_front_without_a_record_counts_whatever_it_names(mark, out):
     path = next(out.rglob("*.nc"))
     front = Front.load(path)
-    front.source = Source(front.source.name, front.source.fingerprint, "evil:build", {})
+    front.source = ProblemSource(front.source.name, front.source.fingerprint, "evil:build", {})
     front.save(path)
     path.with_suffix(".json").unlink()
     assert [run.status for run in Store.open(out).runs()] == ["finished", "finished"] and not mark.exists()

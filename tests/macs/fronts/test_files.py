@@ -26,9 +26,9 @@ from macs import MACS
 from macs.front import Front
 from macs.fronts import files
 from macs.fronts.columns import legal_names
-from macs.fronts.dataset import ARRAYS, VERSION, _arrays, group_names
+from macs.fronts.dataset import VERSION, group_names
 from macs.fronts.point import Point
-from macs.fronts.provenance import Source
+from macs.fronts.provenance import ProblemSource
 from macs.io.atomic import sealed, unsealed
 from problems.compiled import Variable
 from transcription import DFET
@@ -65,7 +65,9 @@ def assert_same_flight(a, b) -> None:
     assert list(a) == list(b) and dict(a.parameters) == dict(b.parameters)
     for name in a:
         p, q = a[name], b[name]
-        assert all(same(_arrays(p)[array], _arrays(q)[array]) for array in ARRAYS)
+        assert all(same(getattr(p, array), getattr(q, array)) for array in ("time", "states", "controls", "paths"))
+        for one, two in ((p.state, q.state), (p.control, q.control)):
+            assert same(one.edges, two.edges) and same(one.coefficients, two.coefficients)
         assert (p.time_unit, p.state.basis, p.control.basis) == (q.time_unit, q.state.basis, q.control.basis)
         assert (p.state_variables, p.control_variables, p.path_limits) == (q.state_variables, q.control_variables, q.path_limits)
 
@@ -213,15 +215,17 @@ def test_states_may_have_any_name(tmp_path):
 
 
 def test_data_that_cannot_be_written_down_has_to_be_passed_again(tmp_path):
-    front = flights(1, problem=Source("two legs", compiled().fingerprint, "two_legs", {"table": np.arange(3.0)}))
+    front = flights(1, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"table": np.arange(3.0)}))
     front.save(tmp_path / "a.nc")
     assert Front.load(tmp_path / "a.nc").source.data == {"table": [0, 1, 2]}
-    flights(1, problem=Source("two legs", compiled().fingerprint, "two_legs", {"f": print})).save(tmp_path / "a.nc")
+    flights(1, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"f": print})).save(tmp_path / "a.nc")
     assert Front.load(tmp_path / "a.nc").source.address == ""
 
 
 def test_large_data_fits(tmp_path):
-    flights(1, problem=Source("two legs", compiled().fingerprint, "two_legs", {"table": list(range(50_000))})).save(tmp_path / "a.nc")
+    flights(1, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"table": list(range(50_000))})).save(
+        tmp_path / "a.nc"
+    )
     assert len(Front.load(tmp_path / "a.nc").source.data["table"]) == 50_000
 
 
@@ -720,14 +724,14 @@ def test_a_file_that_was_changed_by_another_program_is_refused(tmp_path):
 
 def test_opening_a_file_runs_no_code(tmp_path, monkeypatch):
     monkeypatch.setattr("problems.load", lambda *_, **__: pytest.fail("the problem was loaded"))
-    flights(2, problem=Source("two legs", compiled().fingerprint, "two_legs")).save(tmp_path / "front.nc")
+    flights(2, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs")).save(tmp_path / "front.nc")
     front = Front.load(tmp_path / "front.nc")
     front.table()
     assert front.problem is None
 
 
 def save_with(path: Path, address: str, **data) -> None:
-    flights(1, problem=Source("two legs", compiled().fingerprint, address, data)).save(path)
+    flights(1, problem=ProblemSource("two legs", compiled().fingerprint, address, data)).save(path)
 
 
 def test_an_address_in_a_file_is_not_run_unasked(tmp_path, monkeypatch):

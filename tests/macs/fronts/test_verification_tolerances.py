@@ -17,6 +17,7 @@ from macs.fronts.verification import _difference, verify
 from problems import Problem
 from problems.compiled import Variable
 from transcription import DFET
+from transcription.trajectories.simulate import simulate_all
 
 # What a simulation finds, against what is known
 
@@ -50,13 +51,8 @@ def test_objectives_that_a_simulation_does_not_give_are_compared_to_the_toleranc
 
 
 def test_the_integrator_is_the_one_that_is_asked_for(monkeypatch):
-    asked, simulate = [], module.simulate
-
-    def seen(problem, trajectory, **settings):
-        asked.append(settings)
-        return simulate(problem, trajectory, **settings)
-
-    monkeypatch.setattr(module, "simulate", seen)
+    asked = []
+    monkeypatch.setattr(module, "simulate_all", lambda *what, **how: asked.append(how) or simulate_all(*what, **how))
     front = points(cart(), [1.0] * 4)
     verify(front, tolerance=1e-3, rtol=1e-6, atol=1e-7, method="RK45")
     verify(front, tolerance=1e-3)
