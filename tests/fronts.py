@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runs.measures.indicators import SAMPLES, _along, _to_segments, normalised
+from runs.measures.indicators import CURVE_SAMPLES, _along, _to_segments, normalised
 
 __all__ = ["distance_to_curve", "inverted_distance", "mean_distance"]
 
@@ -16,7 +16,7 @@ def distance_to_curve(F: np.ndarray, reference: np.ndarray) -> np.ndarray:
 def inverted_distance(F: np.ndarray, reference: np.ndarray) -> float:
     """Mean distance of the polygon through the reference, sampled evenly along its length, from the nearest point."""
     points, curve = normalised(F, reference)
-    return mean_distance(_along(curve, SAMPLES), points)
+    return mean_distance(_along(curve, CURVE_SAMPLES), points)
 
 
 def mean_distance(reference: np.ndarray, F: np.ndarray) -> float:

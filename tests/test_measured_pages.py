@@ -14,7 +14,7 @@ import pytest
 from runs.bench import BENCHES, sources
 from runs.bench.contract import Row
 from runs.cli import main
-from runs.report.page_header import PageHeader, digest
+from runs.report.page import PageHeader, digest
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "docs" / "measured" / "check.py"

@@ -29,7 +29,7 @@ from scipy.spatial import cKDTree
 
 from problems import load
 from problems.catalogue import CASES, STANDARD
-from runs.report.page_header import PageHeader, digest, print_standing, standing
+from runs.report.page import PageHeader, digest, print_standing, standing
 
 HERE = Path(__file__).parent
 COMMAND = "python docs/gallery/make.py"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from runs.bench import sources
 from runs.cli.parser import build_parser
-from runs.report.page_header import digest, print_standing
+from runs.report.page import digest, print_standing
 
 HERE = Path(__file__).parent
 STUDIES = HERE.parents[1] / "runs" / "studies"

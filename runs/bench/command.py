@@ -13,7 +13,7 @@ from typing import Any
 from macs.io.atomic import write_whole
 from macs.io.interrupts import Stopped
 
-from ..report.page_header import PageHeader, digest
+from ..report.page import PageHeader, digest
 from .contest import CONTESTS
 from .contract import Bench, Row, save
 from .density import DENSITY

@@ -19,7 +19,7 @@ from macs.front import Front
 from ..measures.indicators import hypervolume, igd
 from ..measures.references import union
 from ..measures.statistics import holm, pairwise, summarise
-from ..report.page_header import DIGITS, code
+from ..report.page import CODE_DIGITS, code
 from ..study import Study
 from . import functions as plain
 from .contract import SECONDS, Bench, Column, Effort, Row, Target, column, rounds_of, short
@@ -149,7 +149,7 @@ class Contest:
 
 def search(batch: Study, folder: Path, effort: Effort) -> None:
     """Make the searches that a study's folder lacks, of all solvers or only some."""
-    others = sorted(one.name for one in folder.parent.glob(f"{folder.name[:-DIGITS]}*") if one != folder)
+    others = sorted(one.name for one in folder.parent.glob(f"{folder.name[:-CODE_DIGITS]}*") if one != folder)
     if others and not folder.exists():
         print(f"{batch.name}: searches in {', '.join(others)} are of other code, and are not used", file=sys.stderr)
     summary = batch.run(folder, jobs=effort.jobs, solvers=effort.solvers or None, progress=True)

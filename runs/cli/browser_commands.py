@@ -12,7 +12,7 @@ from .answers import DONE, WrongCall, wrong_call_on_value_error
 
 def report(arguments: Namespace) -> int:
     """A front or a study as one file for the browser."""
-    from ..browser.report import write_page
+    from ..browser.pages import write_page
 
     source = find_source(arguments.source)
     out = Path(arguments.html) if arguments.html else _beside(source)
@@ -31,11 +31,12 @@ def report(arguments: Namespace) -> int:
 
 def serve(arguments: Namespace) -> int:
     """The same page, live, from a server that only reads; until Ctrl-C."""
-    from ..browser.live.server import Server, source_of
+    from ..browser.live import followed
+    from ..browser.server import Server
 
     path = find_source(arguments.source)
     with wrong_call_on_value_error():
-        server = Server(source_of(path, arguments.trust), arguments.host, arguments.port)
+        server = Server(followed(path, arguments.trust), arguments.host, arguments.port)
     with suppress(KeyboardInterrupt), server:
         if not server.local:
             print("warning: everybody on the network can read this; without --host only this machine can", file=sys.stderr)

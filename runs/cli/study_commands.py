@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, wrong_call_on_value_error
 
 if TYPE_CHECKING:
-    from ..report.pages.page import Page
+    from ..report.page import Page
 
 
 def study(arguments: Namespace) -> int:
@@ -88,7 +88,7 @@ def page_of(arguments: Namespace) -> Page:
     """The page that a report is also written to. Raises ValueError or OSError if it cannot be, or the study's file is not found."""
     from ..batch.file import find
     from ..batch.store import Store
-    from ..report.pages.page import Page
+    from ..report.page import Page
     from ..study import Study
 
     if arguments.no_figures or arguments.join:

@@ -1,9 +1,8 @@
-"""Empirical attainment surfaces: the objectives that many runs of one solver attain (Fonseca and others; exact, by moocore).
+"""What many runs attain: empirical attainment surfaces (Fonseca and others; exact, by moocore), and an indicator over the cost of runs.
 
 A point is attained by a run if a point of that run's front is nowhere worse. The surface of k of n runs is the border of the region that
 at least k of them attain: k = 1 the best surface, k = n the worst, half of them the median. A run whose front is empty attains nothing,
-and counts.
-"""
+and counts."""
 
 from __future__ import annotations
 
@@ -14,6 +13,7 @@ import moocore
 import numpy as np
 
 from .indicators import Points, goals_of, minimised
+from .statistics import summarise
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,3 +90,45 @@ def staircase(corners: np.ndarray, signs: np.ndarray, ends: np.ndarray) -> np.nd
     xs = np.concatenate([np.repeat(F[:, 0], 2), [max(worst[0], F[-1, 0])]])
     ys = np.concatenate([[max(worst[1], F[0, 1])], np.repeat(F[:, 1], 2)])
     return np.column_stack([xs, ys]) * signs
+
+
+History = tuple[np.ndarray, np.ndarray]
+"""Increasing moments (k,) - evaluations, inner iterations or seconds - and the indicator (k,) from each of them on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Median and quartiles (g,) over the runs at moments `x` (g,); infinite where that share of the runs had no front."""
+
+    x: np.ndarray
+    lower: np.ndarray
+    median: np.ndarray
+    upper: np.ndarray
+    runs: int
+
+
+def band(histories: Sequence[History], *, larger: bool = False, moments: int = 400) -> Band:
+    """The band of several runs, each with samples of its own.
+
+    A run keeps its last value until its next sample, and for good after its end. Before its first sample, and where its value is NaN or
+    infinite, it has failed, which is worse than any value. histories (k,).
+    """
+    runs = [(np.asarray(x, dtype=float), np.asarray(y, dtype=float)) for x, y in histories]
+    if not runs:
+        raise ValueError("there is no run to draw the history of")
+    for i, (x, y) in enumerate(runs):
+        if x.ndim != 1 or x.shape != y.shape or not len(x) or not np.all(np.diff(x) >= 0):
+            raise ValueError(f"run {i}: moments {x.shape} and values {y.shape} must be as many, one at least, and moments increase")
+    grid = np.unique(np.concatenate([x for x, _ in runs]))
+    if len(grid) > moments:
+        grid = grid[np.unique(np.linspace(0, len(grid) - 1, moments).astype(int))]
+    values = np.array([at(x, y, grid) for x, y in runs])
+    found = [summarise(column, larger=larger) for column in values.T]
+    lower, median, upper = (np.array([getattr(s, name) for s in found]) for name in ("lower", "median", "upper"))
+    return Band(grid, lower, median, upper, len(runs))
+
+
+def at(x: np.ndarray, y: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Value of one run at some moments: that of its last sample; NaN before the first."""
+    last = np.searchsorted(x, moments, side="right") - 1
+    return np.where(last >= 0, y[np.maximum(last, 0)], np.nan)

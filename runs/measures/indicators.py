@@ -6,51 +6,65 @@ is in the user's units and senses, like `Front.objectives`. Of two arrays, all c
 
 Against a sparse reference, or one of three and more objectives, all five are as moocore and pymoo compute them. A dense reference of two
 objectives is the curve through its points, which those packages do not have: there `gd` is less than theirs, by up to half the spacing of
-the points, and `igd` and `igd_plus` weigh each piece of the curve by its length rather than by how many points lie on it.
-"""
+the points, and `igd` and `igd_plus` weigh each piece of the curve by its length rather than by how many points lie on it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import inspect
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 import moocore
 import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.io.text import label
+from macs.io.text import counted, label
 from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
 
-JOINED = 0.02
-"""Neighbours on a reference of two objectives that are nearer than this, in its ranges, are points of one curve."""
-SAMPLES = 2001
-"""Number of points, evenly along its length, that represent such a reference."""
-POINT = 1.1
-"""Corner of the hypervolume in each objective, in ranges of the reference from its ideal."""
+CORNER = 1.1
+"""Of the hypervolume in each objective, in ranges of the reference from its ideal: as published comparisons have it."""
+CURVE_SAMPLES = 2001
+"""Number of points, evenly along its length, that represent a dense reference of two objectives."""
 
 Points = Front | np.ndarray
+Measure = TypeVar("Measure", bound=Callable[..., float])
 
 
+def _documented(measure: Measure) -> Measure:
+    """An indicator whose docstring says what all of them take."""
+    takes = inspect.cleandoc(
+        """
+        Parameters
+        ----------
+        front, reference : Front or array (n, m)
+        normalise : bool
+            Whether objectives are divided by the ranges of the reference.
+        """
+    )
+    curve = "curve : bool\n    Whether a dense reference of two objectives is the curve through its points."
+    imports = "Examples\n--------\n>>> import numpy as np\n>>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])"
+    text = inspect.cleandoc(measure.__doc__ or "")
+    for mark, words in (("[parameters]", takes), ("[curve]", curve), ("[examples]", imports)):
+        text = text.replace(mark, words)
+    measure.__doc__ = text
+    return measure
+
+
+@_documented
 def gd(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """Generational distance: mean distance of the front's points from the reference. NaN for an empty front.
 
     A reference of two objectives is the curve through its points, where they are dense: against points alone no front could be nearer than
     about a quarter of their spacing. With `curve=False` it is its points alone, always, as most published tables have it.
 
-    Parameters
-    ----------
-    front, reference : Front or array (n, m)
-    normalise : bool
-        Whether objectives are divided by the ranges of the reference.
-    curve : bool
-        Whether a dense reference of two objectives is the curve through its points.
+    [parameters]
+    [curve]
 
-    Examples
-    --------
-    >>> import numpy as np
+    [examples]
     >>> from runs import gd
-    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
     >>> round(gd(np.array([[0.1, 1.0]]), truth), 3)
     0.1
     """
@@ -58,24 +72,17 @@ def gd(front: Points, reference: Points, *, normalise: bool = True, curve: bool 
     return float(_to_reference(F, R, curve).mean()) if len(F) else np.nan
 
 
+@_documented
 def igd(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """Inverted generational distance: mean distance of the reference from the nearest point of the front. Infinite for an empty front.
 
-    Where the reference is a curve (see `gd`, also for `curve`), the mean is taken evenly along its length.
+    Where the reference is a curve (see `gd`), the mean is taken evenly along its length.
 
-    Parameters
-    ----------
-    front, reference : Front or array (n, m)
-    normalise : bool
-        Whether objectives are divided by the ranges of the reference.
-    curve : bool
-        Whether a dense reference of two objectives is the curve through its points.
+    [parameters]
+    [curve]
 
-    Examples
-    --------
-    >>> import numpy as np
+    [examples]
     >>> from runs import igd
-    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
     >>> round(igd(truth, truth), 3)
     0.0
     """
@@ -83,22 +90,15 @@ def igd(front: Points, reference: Points, *, normalise: bool = True, curve: bool
     return float(moocore.igd(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
 
+@_documented
 def igd_plus(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """As `igd`, but an objective counts only where a point is worse than the reference in it (Ishibuchi et al. 2015).
 
-    Parameters
-    ----------
-    front, reference : Front or array (n, m)
-    normalise : bool
-        Whether objectives are divided by the ranges of the reference.
-    curve : bool
-        Whether a dense reference of two objectives is the curve through its points.
+    [parameters]
+    [curve]
 
-    Examples
-    --------
-    >>> import numpy as np
+    [examples]
     >>> from runs import igd_plus
-    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
     >>> round(igd_plus(truth, truth), 3)
     0.0
     """
@@ -106,20 +106,14 @@ def igd_plus(front: Points, reference: Points, *, normalise: bool = True, curve:
     return float(moocore.igd_plus(F, ref=_evenly(R, curve))) if len(F) else np.inf
 
 
+@_documented
 def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True) -> float:
     """By how much the front would have to improve in every objective to be nowhere worse than the reference. Infinite if it is empty.
 
-    Parameters
-    ----------
-    front, reference : Front or array (n, m)
-    normalise : bool
-        Whether objectives are divided by the ranges of the reference.
+    [parameters]
 
-    Examples
-    --------
-    >>> import numpy as np
+    [examples]
     >>> from runs import additive_epsilon
-    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
     >>> round(additive_epsilon(truth + 0.1, truth), 3)
     0.1
     """
@@ -127,25 +121,19 @@ def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True
     return float(moocore.epsilon_additive(F, ref=R)) if len(F) else np.inf
 
 
-def hypervolume(front: Points, reference: Points, *, point: float = POINT, normalise: bool = True) -> float:
+@_documented
+def hypervolume(front: Points, reference: Points, *, point: float = CORNER, normalise: bool = True) -> float:
     """Volume that the front dominates, up to `point` in each objective, in which the reference reaches from 0 to 1. 0 if it is empty.
 
     With `normalise=False` the volume is in the objectives' own units, and `point` is how far beyond the reference's nadir it goes, 1.1 for
     a tenth of the reference's range.
 
-    Parameters
-    ----------
-    front, reference : Front or array (n, m)
-    normalise : bool
-        Whether objectives are divided by the ranges of the reference.
+    [parameters]
     point : float
         Corner in each objective, in ranges of the reference from its ideal.
 
-    Examples
-    --------
-    >>> import numpy as np
+    [examples]
     >>> from runs import hypervolume
-    >>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])
     >>> round(hypervolume(truth, truth), 3)
     0.21
     """
@@ -232,7 +220,7 @@ def pieces(R: np.ndarray) -> list[np.ndarray]:
     if R.shape[1] != 2:
         return []
     gaps = np.linalg.norm(np.diff(normalised(R, R)[0], axis=0), axis=1)
-    parts = np.split(R, np.flatnonzero(gaps > JOINED) + 1)
+    parts = np.split(R, np.flatnonzero(gaps > 0.02) + 1)  # nearer neighbours, in ranges, are points of one curve
     return parts if all(len(part) > 1 for part in parts) else []
 
 
@@ -251,7 +239,7 @@ def _evenly(R: np.ndarray, curve: bool) -> np.ndarray:
     if not curves:
         return R
     lengths = np.array([np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() for piece in curves])
-    counts = np.maximum(2, np.round(SAMPLES * lengths / lengths.sum()).astype(int))
+    counts = np.maximum(2, np.round(CURVE_SAMPLES * lengths / lengths.sum()).astype(int))
     return np.vstack([_along(piece, count) for piece, count in zip(curves, counts, strict=True)])
 
 
@@ -268,3 +256,37 @@ def _to_segments(points: np.ndarray, start: np.ndarray, step: np.ndarray) -> np.
     share = ((points[:, None] - start) * step).sum(axis=2) / squared
     nearest = start + np.clip(share, 0.0, 1.0)[..., None] * step
     return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The normalisation of indicators by a reference, in the user's units and senses, in words for captions of tables."""
+
+    ideal: tuple[float, ...]  # ideal, nadir: best and worst value of each objective on the reference, dominated points left out
+    nadir: tuple[float, ...]
+    corner: tuple[float, ...]  # the reference point of the hypervolume
+    goals: tuple[Objective, ...]
+    what: str  # name of the reference: "the closed form", "the union of 60 runs"
+    count: int  # how many points it has
+    curve: bool  # whether its points are taken as the curve through them
+
+    @classmethod
+    def of(cls, reference: Points, *, goals: Sequence[Objective] | None = None, what: str = "the reference", curve: bool = True) -> Scale:
+        """The normalisation by a reference (k, m)."""
+        goals = goals_of([reference]) or goals
+        R = truth(reference, goals)
+        goals = goals or [Objective(f"objective {i + 1}") for i in range(R.shape[1])]
+        ideal, unit = extent(R)
+        sign = np.array([goal.sign for goal in goals])
+        best, worst, corner = (tuple((sign * values + 0.0).tolist()) for values in (ideal, R.max(axis=0), ideal + CORNER * unit))
+        return cls(best, worst, corner, tuple(goals), what, len(R), curve and bool(pieces(R)))
+
+    def describe(self) -> str:
+        """Two sentences for a caption."""
+        how = ", the curve through them" if self.curve else ""
+        ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
+        volume = f"Hypervolume up to {CORNER:g} in each objective ({self._all(self.corner)})."
+        return f"Objectives normalised to {ends} of {self.what} ({counted(self.count, 'point')}{how}). {volume}"
+
+    def _all(self, values: tuple[float, ...]) -> str:
+        return ", ".join(f"{goal.name} {value:.6g} {goal.unit}".rstrip() for goal, value in zip(self.goals, values, strict=True))

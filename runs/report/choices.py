@@ -17,7 +17,7 @@ from macs.preferences.pictures import draw_degrees
 from .comparison import Comparison
 from .flight_plots import flights_figure
 from .plots import COLUMN, PAGE, legend, new_figure, style
-from .tables import Cell, Column, Table, table
+from .tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +79,7 @@ def choices_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str
     if not every:
         return {}
     goals = every[0].point.goals
-    heads: list[Column | str] = [Column("solver", grouped=True), "choice", *_objectives(goals), *_degrees(goals), "verified"]
+    heads: list[Head | str] = [Head("solver", grouped=True), "choice", *_objectives(goals), *_degrees(goals), "verified"]
     rows = [[one.solver, one.label, *one.objectives.tolist(), *_numbers(one.degrees()), _verified(one.point)] for one in every]
     notes = ["Degrees are those of the preference that chose. " + _measures(every)]
     notes += [f"{one.solver}, {one.label}: {one.message}." for one in every if one.message]
@@ -87,8 +87,8 @@ def choices_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str
     steps = [(one, step) for one in every if len(one.steps) > 1 for step in one.steps]
     if steps:
         about = list(dict.fromkeys(name for _, step in steps for name in step["about"]))
-        heads = [Column("solver", grouped=True), Column("choice", grouped=True), "step", *(Column(name, digits=4) for name in about)]
-        heads += [Column("value", digits=5), *_objectives(goals), *_degrees(goals), "status"]
+        heads = [Head("solver", grouped=True), Head("choice", grouped=True), "step", *(Head(name, digits=4) for name in about)]
+        heads += [Head("value", digits=5), *_objectives(goals), *_degrees(goals), "status"]
         found["steps"] = table(
             heads,
             [
@@ -166,12 +166,12 @@ def _parts(every: Sequence[Chosen]) -> list[Sequence[Chosen]]:
     return [every[k : k + SIDE_BY_SIDE] for k in range(0, len(every), SIDE_BY_SIDE)]
 
 
-def _objectives(goals: Sequence[Objective]) -> list[Column]:
-    return [Column(goal.name, goal.unit, digits=5) for goal in goals]
+def _objectives(goals: Sequence[Objective]) -> list[Head]:
+    return [Head(goal.name, goal.unit, digits=5) for goal in goals]
 
 
-def _degrees(goals: Sequence[Objective]) -> list[Column]:
-    return [Column(f"degree of {goal.name}", digits=4) for goal in goals]
+def _degrees(goals: Sequence[Objective]) -> list[Head]:
+    return [Head(f"degree of {goal.name}", digits=4) for goal in goals]
 
 
 def _numbers(degrees: np.ndarray) -> list[Cell]:

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..measures.scale import Scale
+from ..measures.indicators import Scale
 from ..measures.statistics import PairTest, overall, pairwise, summarise
-from .comparison import Comparison
-from .run_measures import CHARGED, Charge, samples, spent
-from .tables import Cell, Column, Table, table
+from .comparison import CHARGED, Charge, Comparison, samples, spent
+from .tables import Cell, Head, Table, table
 
 
 def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
@@ -29,8 +28,8 @@ def claims_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
         fronts = [run.front for run in comparison.runs[solver]]
         misses = [_median([getattr(front, name) for front in fronts]) for name in ("defect", "simulated_violation")]
         rows.append([solver, len(found), claimed, verified, feasible, share, *misses, counts.mean, counts.median])
-    heads: list[Column | str] = ["solver", "runs", "points claimed", "verified", "feasible when simulated", "%"]
-    heads += [Column("median defect of a claim", digits=2), Column("median violation, simulated", digits=2)]
+    heads: list[Head | str] = ["solver", "runs", "points claimed", "verified", "feasible when simulated", "%"]
+    heads += [Head("median defect of a claim", digits=2), Head("median violation, simulated", digits=2)]
     heads += ["of the feasible not dominated, mean of a run", "median"]
     dynamic = any(run.front.dynamic for runs in comparison.runs.values() for run in runs)
     how = (
@@ -82,8 +81,8 @@ def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, T
         for solver, values in solvers.items()
         for summary in [summarise(values)]
     ]
-    heads: list[Column | str] = [Column("cost", grouped=True), "solver", "runs"]
-    heads += [Column(name, digits=4) for name in ("mean", "median", "least", "most")]
+    heads: list[Head | str] = [Head("cost", grouped=True), "solver", "runs"]
+    heads += [Head(name, digits=4) for name in ("mean", "median", "least", "most")]
     notes = ["Work: iterations of IPOPT times variables, or what takes about as long; the same on all machines."]
     if charge is not None:
         notes.append(
@@ -112,8 +111,8 @@ def summary_table(samples: Samples, *, caption: str = "", notes: Sequence[str] =
     failed = any(row[3] for row in rows)
     lines = ["Variance with divisor n - 1."]
     lines += ["Mean and variance are of the runs that did not fail; in all other columns failed runs are worse than any."] if failed else []
-    heads = [Column(name, digits=4) for name in ("median", "lower quartile", "upper quartile", "best", "worst")]
-    first: list[Column | str] = [Column("indicator", grouped=True), "solver", "runs", "failed", Column("mean", digits=4), "variance"]
+    heads = [Head(name, digits=4) for name in ("median", "lower quartile", "upper quartile", "best", "worst")]
+    first: list[Head | str] = [Head("indicator", grouped=True), "solver", "runs", "failed", Head("mean", digits=4), "variance"]
     return table([*first, *heads], rows, caption, [*lines, *notes])
 
 
@@ -125,7 +124,7 @@ def pairs_table(samples: Samples, *, caption: str = "") -> Table:
         for c in pairwise(solvers, larger=indicator in LARGER):
             rows.append([indicator, c.first, c.second, c.p, c.p_holm, c.a12, c.effect, _better(c)])
             notes += [c.note] if c.note else []
-    heads: list[Column | str] = [Column("indicator", grouped=True), Column("first", grouped=True), "second"]
+    heads: list[Head | str] = [Head("indicator", grouped=True), Head("first", grouped=True), "second"]
     heads += ["p", "p (Holm)", "A12", "effect", "better"]
     how = (
         "Mann-Whitney U, two-sided; Holm's correction over the pairs of an indicator. "

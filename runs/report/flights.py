@@ -26,7 +26,7 @@ from ..measures.references import Reference, module_of
 from .comparison import Comparison
 from .flight_plots import Law, flights_figure, paths_figure, representatives
 from .plots import front_figure, style
-from .tables import Cell, Column, Table, table
+from .tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,9 +79,9 @@ class Flights:
         """Their objectives; with two of them, the best of the second that is known for the first; and each objective alone."""
         goals = self.comparison.known.goals
         curve = self._curve()
-        heads: list[Column | str] = ["solution", *(Column(label(goal.name, goal.unit), digits=7) for goal in goals)]
+        heads: list[Head | str] = ["solution", *(Head(label(goal.name, goal.unit), digits=7) for goal in goals)]
         if curve is not None:
-            heads += [Column(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]
+            heads += [Head(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]
         names = [*(f"point {number}" for number in range(1, len(self.points) + 1)), *(f"{goal.name} alone" for goal in goals)]
         # There may be no ends.
         named = zip(names, (*self.points, *self.ends), strict=False)
@@ -227,7 +227,7 @@ class Designs:
         """Objectives and variables of a few points."""
         names = [label(goal.name, goal.unit) for goal in self.front.goals]
         names += [label(variable.name, variable.unit) for variable in self.front.variables]
-        heads: list[Column | str] = ["solution", *(Column(name, digits=5) for name in names)]
+        heads: list[Head | str] = ["solution", *(Head(name, digits=5) for name in names)]
         rows: list[list[Cell]] = [
             [f"point {i}", *self.front.objectives[i].tolist(), *self.front.decision[i].tolist()] for i in self.numbers
         ]

@@ -17,10 +17,10 @@ from macs.front import Front
 
 from ..batch.store import StoredRun
 from ..files import Number, Section, check_known, checked, errors_begin_with
-from ..measures.convergence import Band, History, band
+from ..measures.attainment import Band, History, band
 from .comparison import Comparison
 from .plots import convergence_figure
-from .tables import Cell, Column, Table, table
+from .tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,11 +97,11 @@ class GoalAttainment:
 
     def tables(self) -> dict[str, Table]:
         """{name of a file: table} of the attainment in the end, and of the evaluations to reach shares of it."""
-        heads: list[Column | str] = [Column("transcription", grouped=True), "solver", "runs"]
-        heads += [Column(name, digits=4) for name in ("median attained", "lower quartile", "upper quartile")]
-        heads += [Column("median, verified", digits=4)] if self.verified else []
-        heads += [Column(f"evaluations to {share:g}") for share in self.goal.shares]
-        heads += [Column("time of a run", "s", digits=3)]
+        heads: list[Head | str] = [Head("transcription", grouped=True), "solver", "runs"]
+        heads += [Head(name, digits=4) for name in ("median attained", "lower quartile", "upper quartile")]
+        heads += [Head("median, verified", digits=4)] if self.verified else []
+        heads += [Head(f"evaluations to {share:g}") for share in self.goal.shares]
+        heads += [Head("time of a run", "s", digits=3)]
         rows: list[list[Cell]] = []
         for cell, runs in self.histories.items():
             b = band(runs, larger=True, moments=sum(len(x) for x, _ in runs))

@@ -15,8 +15,7 @@ from macs.fronts.pictures.style import COLORS, GREY, STYLE, better, blank_figure
 from macs.io.text import counted
 from problems.compiled import Objective
 
-from ..measures.attainment import Attainment, staircase
-from ..measures.convergence import History, band
+from ..measures.attainment import Attainment, History, band, staircase
 from ..measures.indicators import Points, minimised, pieces, truth
 
 if TYPE_CHECKING:

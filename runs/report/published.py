@@ -1,38 +1,490 @@
-"""Published tables beside ours: the `[[paper]]` sections of a study, row by row, and the same figures of our runs."""
+"""Published tables beside ours: the `[[paper]]` sections of a study, row by row, and the same figures of our runs.
+
+A kind of table is a class: the keys that a study file states, and how its figures are computed from our fronts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+from msgspec import Meta
 
 from macs.baselines.population import PopulationSolver
+from macs.io.text import counted
+from macs.preferences import FuzzySatisfactory, Preference, Ranges, from_dict
+from problems.checks import unknown
+from problems.compiled import Objective
 
-from ..files import check_known, checked, errors_begin_with
-from .comparison import Comparison
-from .published_designs import Designs
-from .published_kinds import (
-    STATISTIC,
-    Degrees,
-    Ends,
-    Feasibility,
-    Hypervolume,
-    Indicators,
-    Objectives,
-    PayoffTable,
-    Published,
-    figures_of,
-)
-from .tables import Cell, Column, Table, table
+from ..execution.task import FinalStates
+from ..files import Number, Section, Text, check_known, checked, errors_begin_with, is_number
+from ..measures.indicators import Scale, hypervolume_at
+from ..measures.statistics import summarise
+from .choices import chosen
+from .comparison import Comparison, samples, spent
+from .tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
     from macs.solvers.solver import Solver
     from problems.compiled import CompiledProblem
     from problems.vector import CompiledVectorProblem
 
-KINDS = Indicators | Hypervolume | Objectives | Ends | Feasibility | PayoffTable | Degrees | Designs
+Figures = Mapping[str, Cell]
+"""The figures of a row by key."""
+STATISTICS: Mapping[str, Callable[[np.ndarray], float]] = {
+    "greatest": np.max,
+    "least": np.min,
+    "mean": np.mean,
+    "standard deviation": lambda values: np.std(values, ddof=1) if len(values) > 1 else np.nan,
+    "variance": lambda values: np.var(values, ddof=1) if len(values) > 1 else np.nan,
+}
+ROW, STATISTIC, GAIN = ("problem", "by"), "statistic", "better by"
+"""Keys of a row that are no figures, and of the least gain on a design."""
 
 
-def papers(given: Any) -> list[Published]:
+def figures_of(row: Mapping[str, Any]) -> list[str]:
+    """The keys of a row's figures."""
+    return [key for key in row if key not in (*ROW, STATISTIC)]
+
+
+class PublishedTable(Section, tag_field="of", kw_only=True):
+    """A published table, and the same figures of our runs."""
+
+    # `problem` and `by`, figures by key, and `statistic` where the kind has them.
+    rows: Annotated[list[dict[str, Any]], Meta(min_length=1, description="a list of tables")]
+    source: Text = ""  # the paper
+    note: Text = ""  # how the paper's figures were obtained
+    differs: Text = ""  # what differs in ours; "{runs}" stands for the number of our runs
+
+    statistics: ClassVar[bool] = False  # whether there are several rows for each solver, by their `statistic`: usually one of `STATISTICS`
+    statistic_head: ClassVar[str] = STATISTIC
+    population: ClassVar[bool] = False  # whether ours are of solvers with a population alone
+    further: ClassVar[Mapping[str, Head]] = {}  # columns after those of the paper, of our figures alone
+    how: ClassVar[str] = ""  # how our figures were obtained
+
+    @property
+    def columns(self) -> Mapping[str, Head] | None:
+        """{key of a figure: head of its column}; None where the keys are names of objectives."""
+        return None
+
+    def theirs(self, row: Mapping[str, Any]) -> Figures:
+        """The figures of a row of the paper."""
+        return row
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        """{solver: rows of figures} of our runs."""
+        raise NotImplementedError
+
+    def remark(self, comparison: Comparison) -> str:
+        """A sentence on how our figures were obtained."""
+        return self.how
+
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        """Raise ValueError if the table cannot be of this problem."""
+
+    def __post_init__(self) -> None:
+        seen: list[tuple[str, ...]] = []
+        for place, row in enumerate(self.rows, 1):
+            with errors_begin_with(f"row {place}"):
+                self._check_row(row)
+                name = tuple(row[key] for key in (*ROW, STATISTIC) if key in row)
+                if name in seen:
+                    raise ValueError(f"it is of the same as row {seen.index(name) + 1}: {', '.join(name)}")
+                seen.append(name)
+
+    def _check_statistic(self, given: Any) -> None:
+        if not isinstance(given, str) or given not in STATISTICS:
+            raise ValueError(f"{STATISTIC} must be one of {', '.join(STATISTICS)}, not {given!r}")
+
+    def _check_row(self, row: Mapping[str, Any]) -> None:
+        if not all(isinstance(row.get(key), str) for key in ROW):
+            raise ValueError(f"it must be a table with problem and by, not {row!r}")
+        if self.statistics:
+            self._check_statistic(row.get(STATISTIC))
+        elif STATISTIC in row:
+            raise ValueError(f"{STATISTIC}: this kind of table has none")
+        keys = figures_of(row)
+        if self.columns is not None:
+            check_known("key", keys, self.columns)
+        for key in keys:
+            if not is_number(row[key]):
+                raise ValueError(f"{key} must be a finite number, not {row[key]!r}")
+        if not keys:
+            raise ValueError(f"it has no figure: {', '.join(self.columns) if self.columns else 'of some objective'}")
+
+
+class Indicators(PublishedTable, tag="indicators"):
+    """GD and IGD to the points of the union of all runs of the same solver, as papers have them that report one solver, and the time of a
+    run. Beside them ours to the union of all solvers."""
+
+    columns: ClassVar[Mapping[str, Head]] = {
+        "gd_mean": Head("mean GD", digits=4),
+        "gd_variance": Head("variance", digits=4),
+        "igd_mean": Head("mean IGD", digits=4),
+        "igd_variance": Head("variance", digits=4),
+        "seconds": Head("time", "s", digits=4),
+    }
+    further: ClassVar[Mapping[str, Head]] = {f"{key}_all": Head(f"mean {key.upper()}, all solvers", digits=4) for key in ("gd", "igd")}
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        times, together = spent(comparison)["time [s]"], self._indicators(comparison)
+        rows: dict[str, list[Figures]] = {}
+        for solver in comparison.runs:
+            if solver in together:
+                alone = self._indicators(comparison.only(solver)).get(solver, {})
+                seconds = {"seconds": float(np.mean(times[solver]))} if solver in times else {}
+                rows[solver] = [{**alone, **seconds, "gd_all": together[solver]["gd_mean"], "igd_all": together[solver]["igd_mean"]}]
+        return rows
+
+    @staticmethod
+    def _indicators(comparison: Comparison) -> dict[str, Figures]:
+        """By solver, to the union of all that are compared; none if that is empty."""
+        union = comparison.union() if comparison.every else None
+        if union is None or not len(union.front):
+            return {}
+        found = samples(comparison, union, curve=False)
+        rows: dict[str, dict[str, Cell]] = {who: {} for who in found["GD"]}
+        for key in ("GD", "IGD"):
+            for who, values in found[key].items():
+                summary = summarise(values)
+                rows[who] |= {f"{key.lower()}_mean": summary.mean, f"{key.lower()}_variance": summary.variance}
+        return dict(rows)
+
+    def remark(self, comparison: Comparison) -> str:
+        union = comparison.union()
+        if not len(union.front):
+            return "no run found a point."
+        scale = Scale.of(union.front, what=union.what, curve=False).describe().split(". Hypervolume")[0]
+        own = "GD and IGD are to the points of the union of the solver's own runs, in its own ranges"
+        return f"{own}; for all solvers together, {scale[0].lower()}{scale[1:]}. Variance with divisor n - 1."
+
+
+class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):
+    """The volume up to a point in the users' units: best, median and worst of all runs; a failed run has none."""
+
+    point: Annotated[list[Number], Meta(min_length=1, description="a list of numbers, one for each objective")]
+
+    columns: ClassVar[Mapping[str, Head]] = {key: Head(key, digits=5) for key in ("best", "median", "worst")}
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        rows: dict[str, list[Figures]] = {}
+        for solver, fronts in comparison.fronts.items():
+            values = [hypervolume_at(front, self.point) for front in fronts] + [0.0] * comparison.failures.get(solver, 0)
+            if values:
+                rows[solver] = [{"best": max(values), "median": float(np.median(values)), "worst": min(values)}]
+        return rows
+
+    def remark(self, comparison: Comparison) -> str:
+        goals = zip(comparison.known.goals, self.point, strict=True)
+        words = ", ".join(f"{goal.name} {value:g} {goal.unit}".rstrip() for goal, value in goals)
+        best = comparison.reference(None)
+        return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, self.point):.5g}."
+
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        if len(self.point) != len(problem.goals):
+            names = ", ".join(goal.name for goal in problem.goals)
+            raise ValueError(f"point: {len(self.point)} numbers, but {len(problem.goals)} objectives: {names}")
+
+
+class Objectives(PublishedTable, tag="objectives"):
+    """Statistics of each objective over the points of all runs."""
+
+    statistics: ClassVar[bool] = True
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        names, found = comparison.known.names, _points(comparison)
+        return {solver: _statistics(dict(zip(names, objectives.T, strict=True))) for solver, (_, objectives) in found.items()}
+
+    def remark(self, comparison: Comparison) -> str:
+        without = [solver for solver, fronts in comparison.fronts.items() if fronts and not any(map(len, fronts))]
+        none = f" No run of {', '.join(without)} has a point that counts." if without else ""
+        return f"over the points of all runs; deviation and variance with divisor n - 1.{none}"
+
+
+def _points(comparison: Comparison) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """F and objectives (n, m) of all points of each solver that has some."""
+    found = {solver: [front for front in fronts if len(front)] for solver, fronts in comparison.fronts.items()}
+    return {
+        solver: (np.vstack([front.F for front in fronts]), np.vstack([front.objectives for front in fronts]))
+        for solver, fronts in found.items()
+        if fronts
+    }
+
+
+def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:
+    """A row for each of `STATISTICS`, of samples by name."""
+    return [{STATISTIC: name, **{key: float(of(values)) for key, values in columns.items()}} for name, of in STATISTICS.items()]
+
+
+class FinalTarget(Section):
+    """A state at the end of the flight, and its target: the figure is `factor` times the distance between them."""
+
+    name: Text
+    state: Text
+    at: Number
+    unit: Text = ""
+    factor: Number = 1.0
+
+    def final(self, states: FinalStates) -> np.ndarray:
+        """The state (n,) at the end of the last phase that has it."""
+        found = [one[self.state] for one in states.values() if self.state in one]
+        if not found:
+            raise ValueError(f"paper: {self.no_state([name for one in states.values() for name in one])}")
+        return found[-1]
+
+    def no_state(self, known: Sequence[str]) -> str:
+        """That there is no such state."""
+        return f"ends: '{self.name}': {unknown('state', self.state, dict.fromkeys(known))}"
+
+
+class FinalErrors(Objectives, tag="ends", kw_only=True):
+    """Statistics, over the points of all runs, of the distance of final states from their targets."""
+
+    ends: Annotated[list[FinalTarget], Meta(min_length=1, description="a list of tables")]
+
+    @property
+    def columns(self) -> Mapping[str, Head]:
+        return {end.name: Head(end.name, end.unit, digits=4) for end in self.ends}
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        rows: dict[str, list[Figures]] = {}
+        for solver, runs in comparison.counting.items():
+            found = [one.ends for one in runs if len(one.front)]
+            if found:
+                away = {end.name: np.concatenate([end.final(states) for states in found]) - end.at for end in self.ends}
+                rows[solver] = _statistics({end.name: end.factor * np.abs(away[end.name]) for end in self.ends})
+        return rows
+
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        known = [v.name for phase in problem.phases for v in phase.states]
+        for end in self.ends:
+            if end.state not in known:
+                raise ValueError(end.no_state(known))
+
+    def __post_init__(self) -> None:
+        names = [end.name for end in self.ends]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"ends: '{name}' is there twice")
+        super().__post_init__()
+
+
+class Feasibility(PublishedTable, tag="feasibility"):
+    """The generations in which one and in which all of a population were feasible, and the number of points found."""
+
+    population: ClassVar[bool] = True
+    columns: ClassVar[Mapping[str, Head]] = {
+        **{
+            f"{key}{more}": head
+            for key, words in (("first_feasible", "first feasible"), ("all_feasible", "all feasible"))
+            for more, head in (("", Head(f"{words}, mean", digits=4)), ("_median", Head("median", digits=4)), ("_never", Head("never")))
+        },
+        "points": Head("not dominated, claimed", digits=4),
+        "counted": Head("points of a front that count", digits=4),
+    }
+    how: ClassVar[str] = "generations from 1, the first population; means of the runs that got there; points are means of a run."
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        rows: dict[str, list[Figures]] = {}
+        for solver, runs in comparison.runs.items():
+            populations = [run.front.stats["population"] for run in runs if "population" in run.front.stats]
+            if not populations:
+                continue
+            figures: dict[str, Cell] = {}
+            count = len(populations) + comparison.failures.get(solver, 0)
+            for key in ("first_feasible", "all_feasible"):
+                reached = [one[key] for one in populations if one[key] is not None]
+                figures[key] = float(np.mean(reached)) if reached else None
+                # A run that failed, or never got there, is later than any other.
+                middle = float(np.median([*reached, *[np.inf] * (count - len(reached))]))
+                figures[f"{key}_median"] = middle if np.isfinite(middle) else None
+                figures[f"{key}_never"] = count - len(reached)
+            figures["points"] = float(np.mean([one["nondominated"] for one in populations]))
+            figures["counted"] = float(np.mean([len(one.front) for one in comparison.counting[solver]]))
+            rows[solver] = [figures]
+        return rows
+
+
+BEST = "best "
+"""Beginning of the statistic of a payoff table."""
+
+
+class PayoffTable(PublishedTable, tag="payoff"):
+    """The ends of the front. The `statistic` of a row is "best" and the name of an objective."""
+
+    statistics: ClassVar[bool] = True
+    how: ClassVar[str] = "for each objective, the point of all runs that is best in it, and then in the others in their order."
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        goals, rows = comparison.known.goals, dict[str, list[Figures]]()
+        for solver, (F, objectives) in _points(comparison).items():
+            ranges = np.where(np.ptp(F, axis=0) > 0, np.ptp(F, axis=0), 1.0)
+            # Solves agree to some digits only: what is equal within 1e-5 of the range is equal.
+            keys = np.round((F - F.min(axis=0)) / ranges, 5)
+            rows[solver] = []
+            for i, goal in enumerate(goals):
+                order = [i, *(k for k in range(len(goals)) if k != i)]
+                best = objectives[np.lexsort(keys[:, order[::-1]].T)[0]].tolist()
+                rows[solver].append({STATISTIC: BEST + goal.name, **dict(zip(comparison.known.names, best, strict=True))})
+        return rows
+
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        check_known(STATISTIC, [row[STATISTIC] for row in self.rows], {BEST + goal.name: goal.name for goal in problem.goals})
+
+    def _check_statistic(self, given: Any) -> None:
+        if not isinstance(given, str) or not given.startswith(BEST):
+            raise ValueError(f"{STATISTIC} must be '{BEST}' and the name of an objective, not {given!r}")
+
+
+class Degrees(PublishedTable, tag="degrees", kw_only=True):
+    """How well each choice of solvers that decide satisfies each objective. The `statistic` of a row names the choice; its figures are the
+    degrees by name of objectives."""
+
+    # The preference by which all choices are measured, {"method": ..., "settings": {...}}. Default: each by its own.
+    by: dict[str, Any] | None = None
+    # Values of lambda for which eq. (53) of Bae and others is evaluated at the memberships, those of the paper's rows, too. Then these
+    # are in order of priority.
+    regulating: tuple[Number, ...] = ()
+
+    statistics: ClassVar[bool] = True
+    statistic_head: ClassVar[str] = "choice"
+
+    @property
+    def columns(self) -> Mapping[str, Head]:
+        found = {name: Head(name, "degree", digits=4) for name in self._names}
+        return found | {key: Head(key, digits=4) for key in self._more}
+
+    def theirs(self, row: Mapping[str, Any]) -> Figures:
+        degrees = [row.get(name) for name in self._names]
+        return row if None in degrees else {**row, **self._satisfactory(np.array(degrees, dtype=float))}
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        rows: dict[str, list[Figures]] = {}
+        for one in chosen(comparison):
+            named = dict(zip((goal.name for goal in one.point.goals), one.degrees(self.preference).tolist(), strict=True))
+            more = self._satisfactory(np.array([named[name] for name in self._names]))
+            mark = "" if one.point.verified else " (not verified)"
+            rows.setdefault(one.solver, []).append({STATISTIC: one.label + mark, **named, **more})
+        return rows
+
+    def remark(self, comparison: Comparison) -> str:
+        by = "the preference that chose" if self.preference is None else repr(self.preference)
+        return f"degrees of ours by {by}.{''.join(f' {one}' for one in self.optima())}"
+
+    def optima(self) -> list[str]:
+        """For each lambda, the least value of eq. (53) over the paper's rows and both ends of its front."""
+        known = {f"best {name}": self._satisfactory(end) for name, end in zip(self._names, np.eye(len(self._names)), strict=True)}
+        known |= {row[STATISTIC]: self.theirs(row) for row in self.rows}
+        found = []
+        for weight, key in zip(self.regulating, self._more[1:], strict=True):
+            values = {name: value for name, figures in known.items() if isinstance(value := figures.get(key), float)}
+            least = min(values, key=lambda name: values[name])
+            found.append(f"With lambda = {weight:g}, eq. (53) is least, of the paper's rows and ends, at '{least}': {values[least]:.4g}.")
+        return found
+
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        names = [goal.name for goal in problem.goals]
+        check_known("objective", self._names, names)
+        if self.preference is not None:
+            with errors_begin_with("by"):
+                none = dict.fromkeys(names, 0.0)
+                self.preference.stages(problem.goals, Ranges(none, none))
+
+    @property
+    def preference(self) -> Preference | None:
+        """The preference by which all choices are measured."""
+        return None if self.by is None else from_dict(self.by)
+
+    @property
+    def _names(self) -> list[str]:
+        """Names of the objectives."""
+        return list(dict.fromkeys(key for row in self.rows for key in figures_of(row)))
+
+    @property
+    def _more(self) -> list[str]:
+        return ["kappa", *(f"(53) at {weight:g}" for weight in self.regulating)] if self.regulating else []
+
+    def _satisfactory(self, degrees: np.ndarray) -> Figures:
+        """kappa and eq. (53), for each lambda, at memberships (m,); nothing without a lambda."""
+        if not self.regulating:
+            return {}
+        goals = [Objective(name, "", "maximize") for name in self._names]
+        ranges = Ranges(dict.fromkeys(self._names, 1.0), dict.fromkeys(self._names, 0.0))
+        goal = FuzzySatisfactory({}, self._names)
+        values = [replace(goal, regulating=weight).stages(goals, ranges)[0].numbers(degrees[None])[0] for weight in self.regulating]
+        return dict(zip(self._more, map(float, [goal.kappa(goals, ranges, degrees[None])[0], *values]), strict=True))
+
+    def _check_statistic(self, given: Any) -> None:
+        if not isinstance(given, str) or not given:
+            raise ValueError(f"{STATISTIC} must name a choice, not {given!r}")
+
+    def __post_init__(self) -> None:
+        if self.by is not None:
+            with errors_begin_with("by"):
+                from_dict(self.by)
+        super().__post_init__()
+
+
+class DominatedDesigns(PublishedTable, tag="designs"):
+    """Designs with a figure for every objective; for each, of all runs, the verified point of the greatest least gain in all objectives,
+    each a share of the design's figure. Where that is not positive, no point dominates the design."""
+
+    statistics: ClassVar[bool] = True
+    statistic_head: ClassVar[str] = "beside"
+    further: ClassVar[Mapping[str, Head]] = {GAIN: Head(GAIN, "%", digits=3)}
+
+    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
+        designs = [row for row in self.rows if row["problem"] == comparison.problem]
+        rows: dict[str, list[Figures]] = {}
+        for solver, fronts in comparison.fronts.items():
+            # Points that a simulation confirms; of fronts that were not simulated all.
+            points = [front.objectives[front.verified | ~front.was_simulated] for front in fronts]
+            if designs and sum(map(len, points)):
+                rows[solver] = [{STATISTIC: row["by"], **_best_gain(row, comparison, np.vstack(points))} for row in designs]
+        return rows
+
+    def remark(self, comparison: Comparison) -> str:
+        counts = [
+            f"{solver} dominates {sum(float(str(one[GAIN])) > 0.0 for one in found)} of {len(found)} designs"
+            for solver, found in self.ours(comparison).items()
+        ]
+        return (
+            f"{', '.join(counts) or 'no point that counts'}. Beside each design, the point that is better in all objectives by the largest "
+            "share of its figures; a share that is negative: no point dominates it, and this one comes nearest."
+        )
+
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        for row in self.rows:
+            missing = [goal.name for goal in problem.goals if goal.name not in row]
+            if missing:
+                raise ValueError(f"the design '{row['by']}' has no {', '.join(missing)}: figures of all objectives are compared")
+
+    def _check_statistic(self, given: Any) -> None:
+        if given is not None:
+            raise ValueError(f"{STATISTIC}: this kind of table has none")
+
+    def _check_row(self, row: Mapping[str, Any]) -> None:
+        super()._check_row(row)
+        for key in figures_of(row):
+            if row[key] == 0:
+                raise ValueError(f"{key} must not be 0: gains are shares of it")
+
+
+def _best_gain(design: Mapping[str, Any], comparison: Comparison, objectives: np.ndarray) -> Figures:
+    """Of points with objectives (n, m), that of the greatest least gain on a design, with the gain in %."""
+    goals = comparison.known.goals
+    figures = np.array([design[goal.name] for goal in goals])
+    gains = (np.array([goal.sign for goal in goals]) * (figures - objectives) / np.abs(figures)).min(axis=1)
+    best = int(gains.argmax())
+    return {**dict(zip(comparison.known.names, objectives[best].tolist(), strict=True)), GAIN: 100.0 * float(gains[best])}
+
+
+KINDS = Indicators | Hypervolume | Objectives | FinalErrors | Feasibility | PayoffTable | Degrees | DominatedDesigns
+
+
+def papers(given: Any) -> list[PublishedTable]:
     """The published tables that a study states. Raises ValueError that names the section, the row and the key that is wrong."""
     if isinstance(given, str | Mapping) or not isinstance(given, Sequence):
         raise ValueError(f"paper must be a list of tables, [[paper]], not a {type(given).__name__}")
@@ -41,6 +493,12 @@ def papers(given: Any) -> list[Published]:
         with errors_begin_with(_section(number, paper)):
             found.append(checked(paper, KINDS))
     return found
+
+
+def _section(number: int, paper: Any) -> str:
+    """Name of a section in messages."""
+    of = paper.get("of") if isinstance(paper, Mapping) else None
+    return f"[[paper]] {number}{f', of {of}' if isinstance(of, str) else ''}"
 
 
 def check_against(given: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem], solvers: Mapping[str, Solver]) -> None:
@@ -59,26 +517,19 @@ def check_against(given: Any, problems: Mapping[str, CompiledProblem | CompiledV
                     paper.check_problem(problems[label])
 
 
-def published_tables(comparisons: Sequence[Comparison], papers: Sequence[Published]) -> dict[str, Table]:
+def published_tables(comparisons: Sequence[Comparison], study: Mapping[str, Any]) -> dict[str, Table]:
     """{name of a file: table} of the paper's rows and ours, problem by problem. Problems without finished runs are left out."""
-    found: dict[str, Table] = {}
-    for number, paper in enumerate(papers, 1):
-        together = _beside(comparisons, paper)
-        if together is not None:
-            found["published" if len(papers) == 1 else f"published-{number}"] = together
-    return found
+    stated = papers(study.get("paper") or [])
+    names = ["published"] if len(stated) == 1 else [f"published-{number}" for number in range(1, len(stated) + 1)]
+    found = {name: _beside(comparisons, paper, study) for name, paper in zip(names, stated, strict=True)}
+    return {name: one for name, one in found.items() if one is not None}
 
 
-def _section(number: int, paper: Any) -> str:
-    """Name of a section in messages."""
-    of = paper.get("of") if isinstance(paper, Mapping) else None
-    return f"[[paper]] {number}{f', of {of}' if isinstance(of, str) else ''}"
-
-
-def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None:
+def _beside(comparisons: Sequence[Comparison], paper: PublishedTable, study: Mapping[str, Any]) -> Table | None:
     """One published table and ours; None if there are no runs of its problems."""
     columns = paper.columns
     keys = [*(columns or dict.fromkeys(key for row in paper.rows for key in figures_of(row))), *paper.further]
+    timed = "seconds" in keys
     rows: list[list[Cell]] = []
     notes: list[str] = []
     for problem in dict.fromkeys(row["problem"] for row in paper.rows):
@@ -86,17 +537,22 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
         theirs = [row for row in paper.rows if row["problem"] == problem]
         if not here:
             continue
-        seconds = max((row["seconds"] for row in theirs if "seconds" in row), default=None)
-        rows += [[problem, row["by"], None, *_cells(paper.theirs(row), keys, None, paper.statistics)] for row in theirs]
+        took = max((row["seconds"] for row in theirs if "seconds" in row), default=None)
+
+        def cells(figures: Figures, took: float | None) -> list[Cell]:
+            own = figures.get("seconds")
+            ratio: list[Cell] = [took / own if took and isinstance(own, float) else None] if timed else []
+            return [*([figures.get(STATISTIC)] if paper.statistics else []), *(figures.get(key) for key in keys), *ratio]
+
+        rows += [[problem, row["by"], None, *cells(paper.theirs(row), None)] for row in theirs]
         seen = set[tuple[str, str]]()
         for comparison in here:
             for solver, figures in paper.ours(comparison).items():
-                if (solver, comparison.place(solver)) in seen:
-                    continue  # it works apart, and is on each of the others' comparisons
-                seen.add((solver, comparison.place(solver)))
-                runs = len(comparison.fronts[solver]) + comparison.failures.get(solver, 0)
-                by = f"{solver}, {comparison.place(solver)}"
-                rows += [[problem, by, runs, *_cells(one, keys, seconds, paper.statistics)] for one in figures]
+                place = comparison.place(solver)
+                if (solver, place) not in seen:  # one that works apart is on each of the others' comparisons
+                    runs = len(comparison.fronts[solver]) + comparison.failures.get(solver, 0)
+                    rows += [[problem, f"{solver}, {place}", runs, *cells(one, took)] for one in figures]
+                seen.add((solver, place))
         remarks = {comparison.transcription: paper.remark(comparison) for comparison in here}
         if len(set(remarks.values())) == 1:
             notes.append(f"{problem}: {remarks[here[0].transcription]}")
@@ -104,22 +560,17 @@ def _beside(comparisons: Sequence[Comparison], paper: Published) -> Table | None
             notes += [f"{problem}, {place}: {note}" for place, note in remarks.items()]
     if not rows:
         return None
-    heads: list[Column | str] = [Column("problem", grouped=True)]
-    heads += [Column(name, grouped=paper.statistics) for name in ("by", "runs")]
+    heads: list[Head | str] = [Head("problem", grouped=True), *(Head(name, grouped=paper.statistics) for name in ("by", "runs"))]
     heads += [paper.statistic_head] if paper.statistics else []
     units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
     known = {**(columns or {}), **paper.further}
-    heads += [known.get(key) or Column(key, units.get(key, ""), digits=4) for key in keys]
-    heads += [Column("the paper's time / ours", digits=2)] if "seconds" in keys else []
+    heads += [known.get(key) or Head(key, units.get(key, ""), digits=4) for key in keys]
+    heads += [Head("the paper's time / ours", digits=2)] if timed else []
     caption = f"Beside {paper.source}" if paper.source else "Beside published figures"
-    words = [f"{word}: {text}." for word, text in (("The paper", paper.note), ("What differs", paper.differs)) if text]
+    words = [f"{word}: {with_count(text, study)}." for word, text in (("The paper", paper.note), ("What differs", paper.differs)) if text]
     return table(heads, rows, f"{caption}.", [*notes, *words])
 
 
-def _cells(figures: Mapping[str, Any], keys: Sequence[str], theirs: float | None, statistics: bool) -> list[Cell]:
-    """A row's figures, after its statistic in tables that have `statistics`; `theirs` are the seconds that the paper's took."""
-    cells: list[Cell] = [figures.get(STATISTIC)] if statistics else []
-    cells += [figures.get(key) for key in keys]
-    if "seconds" in keys:
-        cells.append(theirs / figures["seconds"] if theirs and figures.get("seconds") else None)
-    return cells
+def with_count(text: str, study: Mapping[str, Any]) -> str:
+    """A text of a study with the number of its runs in place of "{runs}"."""
+    return text.replace("{runs}", counted(int(study.get("runs", 0)), "run"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -16,7 +16,6 @@ import numpy as np
 
 from macs.front import Front
 from macs.io.atomic import write_whole
-from macs.io.console import Steps
 from macs.io.text import counted
 
 from ..batch.store import Store
@@ -26,14 +25,13 @@ from ..measures.references import ReferenceKey, read, reference_addresses
 from .changed.data import ChangedData, changed_data
 from .changed.dispersions import DispersedFront, dispersed_fronts
 from .choices import choices_figures, choices_tables, only_choices
-from .comparison import Comparison, comparisons
+from .comparison import AXES, CHARGED, Charge, Comparison, comparisons, histories, in_steps
 from .comparison_tables import claims_tables, cost_tables, indicator_tables
 from .flights import Designs, Flights
 from .goal import Goal, GoalAttainment, goal_attainments
-from .pages.page import Page
+from .page import Page
 from .plots import attainment_figure, convergence_figure, front_figure
-from .published import papers, published_tables
-from .run_measures import AXES, CHARGED, Charge, histories
+from .published import papers, published_tables, with_count
 from .tables import Table
 
 if TYPE_CHECKING:
@@ -90,7 +88,7 @@ def report(
         page.check(store)
     with errors_begin_with(f"'{store.path / 'study.json'}'"):
         keys = checked({key: study[key] for key in ReportKeys.__struct_fields__ if key in study}, ReportKeys)
-        published = papers(study.get("paper") or [])
+        papers(study.get("paper") or [])
         if study.get("goal") is not None:
             Goal.of(study["goal"], {})
         for address in reference_addresses(keys.reference):
@@ -100,27 +98,19 @@ def report(
     if others:
         found = comparisons(store, others)
     writer = _Writer(Path(out) / FOLDER, page)
-    sections = [str(summary), *([keys.note] if keys.note else [])]
-    for comparison in _shown(found) if progress else found:
+    sections = [str(summary), *([with_count(keys.note, study)] if keys.note else [])]
+    for comparison in in_steps("report", found) if progress else found:
         sections += _section(comparison, study, writer, figures)
     for part in _across(found, study):
         sections += [writer.table(name, one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
             writer.figure(name, figure)
-    sections += [writer.table(name, one) for name, one in published_tables(found, published).items()]
+    sections += [writer.table(name, one) for name, one in published_tables(found, study).items()]
     text = "\n\n".join(sections)
     writer.write("report.txt", text.encode() + b"\n")
     if page is not None:
         writer.files += page.save(summary, study)
     return Report(text, tuple(writer.files))
-
-
-def _shown(found: Sequence[Comparison]) -> Iterator[Comparison]:
-    """The comparisons one by one; the terminal shows which one is in progress."""
-    with Steps("report", len(found), at_once=True) as steps:
-        for comparison in found:
-            steps.begin(comparison.name)
-            yield comparison
 
 
 def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
@@ -156,7 +146,7 @@ def _across(found: Sequence[Comparison], study: Mapping[str, Any]) -> list[GoalA
 def tables_across(found: Sequence[Comparison], study: Mapping[str, Any]) -> dict[str, Table]:
     """{name of a file: table} of several comparisons together: a goal, changed data, dispersions, and published tables beside ours."""
     parts = [part.tables() for part in _across(found, study)]
-    return {name: one for tables in (*parts, published_tables(found, papers(study.get("paper") or []))) for name, one in tables.items()}
+    return {name: one for tables in (*parts, published_tables(found, study)) for name, one in tables.items()}
 
 
 def _foreign(path: str | PathLike[str], found: Sequence[Comparison]) -> Front:
@@ -190,11 +180,8 @@ def _figures(comparison: Comparison) -> dict[str, Figure]:
         found["fronts"] = front_figure(comparison.fronts, goals=comparison.known.goals, reference=reference.front, truth_name=name)
     if only_choices(comparison):
         return found
-    # A failed run attains nothing, as an empty front does.
-    nothing = comparison.known[:0]
-    runs = {solver: [*fronts, *[nothing] * comparison.failures.get(solver, 0)] for solver, fronts in comparison.fronts.items()}
     if len(comparison.known.goals) == 2:
-        surfaces = {solver: attainment(fronts) for solver, fronts in runs.items() if any(map(len, fronts))}
+        surfaces = {solver: attainment(fronts) for solver, fronts in comparison.attaining().items()}
         if surfaces:
             found["attainment"] = attainment_figure(surfaces, goals=comparison.known.goals, reference=reference.front, truth_name=name)
     charge = Charge.of(comparison)

@@ -41,7 +41,7 @@ ESCAPES: dict[str, str] = {character: f"\\{character}" for character in "&%$#_{}
 
 
 @dataclass(frozen=True)
-class Column:
+class Head:
     """The head of a column."""
 
     title: str
@@ -54,7 +54,7 @@ class Column:
 class Table:
     """Columns and rows of cells, with a caption above and notes below."""
 
-    columns: tuple[Column, ...]
+    columns: tuple[Head, ...]
     rows: tuple[tuple[Cell, ...], ...]
     caption: str = ""
     notes: tuple[str, ...] = ()
@@ -186,7 +186,7 @@ def _latex(cell: Cell, digits: int) -> str:
     return f"${cell}$" if isinstance(cell, int | np.integer) else latex_number(cell, digits)
 
 
-def table(columns: Sequence[Column | str], rows: Sequence[Sequence[Cell]], caption: str = "", notes: Sequence[str] = ()) -> Table:
+def table(columns: Sequence[Head | str], rows: Sequence[Sequence[Cell]], caption: str = "", notes: Sequence[str] = ()) -> Table:
     """A `Table` of lists; a column may be its title alone."""
-    heads = tuple(Column(column) if isinstance(column, str) else column for column in columns)
+    heads = tuple(Head(column) if isinstance(column, str) else column for column in columns)
     return Table(heads, tuple(tuple(row) for row in rows), caption, tuple(notes))

@@ -13,9 +13,8 @@ from chromium import NEEDS_CHROMIUM, errors, opened_alone, wait
 from synthetic_fronts import black_box, flights, marked
 
 from runs.browser import page as pages
-from runs.browser.curves import differences
-from runs.browser.front_page import front_page
-from runs.browser.points import about, columns, details, goals_data, samples_of
+from runs.browser.pages import front_page, run_data
+from runs.browser.points import details, differences, goals_data, samples_of
 
 pytest.importorskip("plotly")
 webdriver = pytest.importorskip("selenium.webdriver")
@@ -132,10 +131,7 @@ def study_like(runs: int, points: int) -> bytes:
     front = flights(points)
     samples = samples_of([front] * runs)
     packed = pages.packed(details(front, samples))
-    told = [
-        {"solver": f"solver {k % 4}", "number": k // 4 + 1, "block": str(k), "points": columns(front), "about": about(front)}
-        for k in range(runs)
-    ]
+    told = [run_data(front, f"solver {k % 4}", k // 4 + 1, str(k)) for k in range(runs)]
     comparison = {"name": "many", "goals": goals_data(front.goals), "solvers": [f"solver {k}" for k in range(4)], "runs": told}
     progress = {"total": runs, "finished": runs, "failed": 0, "cells": [], "failures": []}
     data = {"title": "many", "kind": "study", "comparisons": [comparison], "progress": progress}

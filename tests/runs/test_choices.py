@@ -102,7 +102,7 @@ def test_eq_53_at_the_printed_memberships():
         (one,) = papers([{"of": "degrees", "regulating": [float(weight)], "rows": ROWS}])
         values = [one.theirs(row)[f"(53) at {weight:g}"] for row in one.rows]
         assert np.argmin(values) == 1
-        assert f"at '0.2': {values[1]:.4g}" in " ".join(one._optima())
+        assert f"at '0.2': {values[1]:.4g}" in " ".join(one.optima())
     assert FuzzySatisfactory({}, ["a", "b"]).regulating == 0.1
 
 

@@ -241,7 +241,7 @@ def test_ends_that_make_no_sense_are_refused(ends, message):
 def test_a_state_that_does_not_exist_is_named(folder):
     paper = {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 0.0}], "rows": [{**ROW, "statistic": "mean", "miss": 5.0}]}
     with pytest.raises(ValueError, match="unknown state 'y'; there are x, v"):
-        published_tables(comparisons(Store.open(folder), {}), papers([paper]))
+        published_tables(comparisons(Store.open(folder), {}), {"paper": [paper]})
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runs.measures.convergence import band
+from runs.measures.attainment import band
 
 
 def test_a_band_by_hand():

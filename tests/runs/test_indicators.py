@@ -108,7 +108,7 @@ def test_what_did_not_converge_is_no_point():
 
 
 def test_the_scale_says_what_was_done():
-    from runs.measures.scale import Scale
+    from runs.measures.indicators import Scale
 
     goals = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
     front = foreign(np.array([[110.0, 0.5]]), goals)
@@ -119,8 +119,8 @@ def test_the_scale_says_what_was_done():
     words = scale.describe()
     assert "nadir (flight time 200 s, speed 0 km/s) of the closed form (3 points)" in words
     assert "up to 1.1 in each objective (flight time 210 s, speed -0.1 km/s)" in words
-    assert "(2001 points, the curve through them)" in Scale.of(goddard.reference(), goals=goals).describe()
-    assert "(2001 points)" in Scale.of(goddard.reference(), goals=goals, curve=False).describe()
+    assert "(2 001 points, the curve through them)" in Scale.of(goddard.reference(), goals=goals).describe()
+    assert "(2 001 points)" in Scale.of(goddard.reference(), goals=goals, curve=False).describe()
     # What the volume is measured in: the box from the front's point to the corner, in ranges.
     assert hypervolume(front, truth) == pytest.approx(np.prod((np.array(scale.corner) - [110, 0.5]) / [100, -1]))
     assert [goal.name for goal in Scale.of(truth * [1, -1]).goals] == ["objective 1", "objective 2"]

@@ -8,8 +8,8 @@ from datetime import date
 import pytest
 
 from macs.fronts.provenance import versions
-from runs.report import page_header
-from runs.report.page_header import PageHeader, digest
+from runs.report import page as page_header
+from runs.report.page import PageHeader, digest
 
 
 def test_header_as_written_is_read_again(tmp_path):
@@ -30,7 +30,7 @@ def test_the_version_is_of_the_code_that_searches(tmp_path, monkeypatch):
     module.write_text("step = 1\n")
     monkeypatch.setattr(page_header.macs, "__path__", [str(tmp_path / "macs")])
     before = page_header.code()
-    assert page_header.code() == before and len(before) == page_header.DIGITS
+    assert page_header.code() == before and len(before) == page_header.CODE_DIGITS
     assert page_header.version() == f"{versions()['macs-trajectories']}+{before}"
     module.write_text("step = 2\n")
     assert page_header.code() != before

@@ -17,10 +17,9 @@ from macs.fronts.points import Points
 from runs import Study
 from runs.batch.store import Store
 from runs.cli import main
-from runs.report.comparison import comparisons
-from runs.report.page_header import PageHeader
-from runs.report.run_measures import AXES, CHARGED, Charge, histories, spent
-from runs.report.tables import Column, table
+from runs.report.comparison import AXES, CHARGED, Charge, comparisons, histories, spent
+from runs.report.page import PageHeader
+from runs.report.tables import Head, table
 
 TOML = """name = "small"
 description = "A small study"
@@ -168,6 +167,6 @@ def test_unions_hold_only_what_a_simulation_found(place, tmp_path):
 
 
 def test_markdown_of_a_table():
-    text = table([Column("name"), Column("size", "m")], [["a|b", 1.5], ["c", None]], "A caption.", ["A note."]).markdown()
+    text = table([Head("name"), Head("size", "m")], [["a|b", 1.5], ["c", None]], "A caption.", ["A note."]).markdown()
     rows = ["| name | size [m] |", "| :--- | ---: |", r"| a\|b | 1.50 |", "| c | - |"]
     assert text.splitlines() == ["**A caption.**", "", *rows, "", "A note."]

@@ -144,7 +144,7 @@ def test_solvers_without_a_point_are_named_where_they_have_no_statistics(folder)
     (comparison,) = comparisons(Store.open(folder), {})
     fronts = {"one": comparison.fronts["one"], "lost": [comparison.known[:0]] * 2, "worse": [comparison.known[:0]], "crashed": []}
     paper = {"of": "objectives", "rows": [{**ROW, "statistic": "mean", "distance": 7.0}]}
-    text = published_tables([replace(comparison, fronts=fronts, failures={})], papers([paper]))["published"].text()
+    text = published_tables([replace(comparison, fronts=fronts, failures={})], {"paper": [paper]})["published"].text()
     assert "divisor n - 1. No run of lost, worse has a point that counts." in text
 
 
@@ -158,7 +158,7 @@ def test_the_point_that_dominates_a_design_and_by_how_much(folder, tmp_path):
         {"problem": "glide", "by": "far", "time": 4.0, "distance": 16.0},
         {"problem": "dive", "by": "another", "time": 1.0, "distance": 1.0},
     ]
-    (found,) = published_tables([replace(comparison, fronts=fronts, failures={})], papers([{"of": "designs", "rows": rows}])).values()
+    (found,) = published_tables([replace(comparison, fronts=fronts, failures={})], {"paper": [{"of": "designs", "rows": rows}]}).values()
     assert [column.title for column in found.columns] == ["problem", "by", "runs", "beside", "time", "distance", "better by"]
     cells = {(row[1], row[3]): row for row in found.rows}
     assert cells["slow", None][-3:] == (2.5, 5.0, None)
@@ -171,7 +171,7 @@ def test_the_point_that_dominates_a_design_and_by_how_much(folder, tmp_path):
     doubted = theirs.replace(defect=np.where(theirs.objectives[:, 0] == 2.0, 1.0, np.nan))
     assert not doubted.verified.any() and doubted.was_simulated.sum() == 1
     without = replace(comparison, fronts={"theirs": [doubted]}, failures={})
-    (found,) = published_tables([without], papers([{"of": "designs", "rows": rows}])).values()
+    (found,) = published_tables([without], {"paper": [{"of": "designs", "rows": rows}]}).values()
     assert [row[-1] for row in found.rows if row[3] == "slow"] == [pytest.approx(-40.0)]
 
 
@@ -303,7 +303,7 @@ def test_every_problem_of_a_published_table_is_looked_at():
 
 def test_problems_without_finished_runs_are_left_out_of_published_tables(folder):
     rows = [{**ROW, "best": 3.0}, {"problem": "dive", "by": "the paper", "best": 1.0}]
-    found = published_tables(comparisons(Store.open(folder), {}), papers([{"of": "hypervolume", "point": [10.0, 0.0], "rows": rows}]))
+    found = published_tables(comparisons(Store.open(folder), {}), {"paper": [{"of": "hypervolume", "point": [10.0, 0.0], "rows": rows}]})
     assert "dive" not in found["published"].text() and "glide" in found["published"].text()
 
 

@@ -26,17 +26,12 @@ from runs import Study
 from runs.batch import progress as progress_module
 from runs.batch.progress import ProgressFile, read_progress
 from runs.batch.store import Store
-from runs.browser.live import source as sources
-from runs.browser.live.server import Server, source_of
+from runs.browser.live import followed
+from runs.browser.server import Server
 from runs.cli import main
 from runs.execution.samples import Samples
 
 pytest.importorskip("plotly")
-
-
-@pytest.fixture(autouse=True)
-def _impatient(monkeypatch):
-    monkeypatch.setattr(sources, "REST", 0.02)
 
 
 def study(**changes) -> Study:
@@ -97,7 +92,7 @@ class Client:
 
 @contextmanager
 def served(path: Path, trust: bool = False, host: str = "127.0.0.1"):
-    server = Server(source_of(path, trust), host)
+    server = Server(followed(path, trust), host)
     threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
     try:
         client = Client(server)
@@ -135,90 +130,74 @@ def test_the_routes_have_what_the_report_has_and_nothing_is_written(out):
     assert contents(out) == before
 
 
-@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT", "MACS"])
-def test_only_get_and_head_are_answered(out, method):
-    with served(out) as client:
+@pytest.fixture(scope="module")
+def client(made):
+    with served(made) as one:
+        yield one
+
+
+def test_only_get_and_head_are_answered(client):
+    for method in ("POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "MACS"):
         answer = client.ask("/", method)
         assert (answer.status, answer.headers["Allow"]) == (405, "GET, HEAD")
+    for path in ("/", "/data.json"):
+        got, head = client.ask(path), client.ask(path, "HEAD")
+        assert head.content == b"" and head.headers["Content-Length"] == got.headers["Content-Length"] == str(len(got.content))
 
 
-def test_head_has_the_headers_of_get_without_content(out):
-    with served(out) as client:
-        for path in ("/", "/data.json"):
-            got, head = client.ask(path), client.ask(path, "HEAD")
-            assert head.content == b"" and head.headers["Content-Length"] == got.headers["Content-Length"] == str(len(got.content))
-
-
-@pytest.mark.parametrize(
-    "path",
-    ["/study.json", "/../study.json", "/details/../study.json", "/details/%2e%2e%2fstudy.json", "/..%2f..%2fetc/passwd",
-     "//etc/passwd", "/static/main.js", "/scripts.js/", "/details/9-1.json", "/details/0-99.json", "/data", "/.progress",
-     "/?/../study.json", "/details/.json"],
-)  # fmt: skip
-def test_no_file_is_served_by_its_path(out, path):
-    with served(out) as client:
+def test_no_file_is_served_by_its_path(client):
+    for path in (
+        *("/study.json", "/../study.json", "/details/../study.json", "/details/%2e%2e%2fstudy.json", "/..%2f..%2fetc/passwd"),
+        *("//etc/passwd", "/static/main.js", "/scripts.js/", "/details/9-1.json", "/details/0-99.json", "/data", "/.progress"),
+        *("/?/../study.json", "/details/.json"),
+    ):
         answer = client.ask(path)
-        assert answer.status == (200 if path.startswith("/?") else 404)
+        assert answer.status == (200 if path.startswith("/?") else 404), path
         assert b"crc32" not in answer.content and b"root:" not in answer.content
 
 
-def test_names_of_other_places_are_refused_where_only_this_machine_is_meant(out):
-    with served(out) as client:
-        port = client.server.server_address[1]
-        for host in ("localhost", "127.0.0.1", f"localhost:{port}", f"LOCALHOST:{port}", "[::1]:80"):
-            assert client.ask("/status.json", Host=host).status == 200, host
-        for host in ("evil.example", f"evil.example:{port}", "localhost.evil.example", "127.0.0.1.evil.example", "", "evil@localhost"):
-            assert client.ask("/status.json", Host=host).status == 403, host
-    with served(out, host="0.0.0.0") as client:
-        assert not client.server.local and client.ask("/status.json", Host="lab.example:80").status == 200
+def test_names_of_other_places_are_refused_where_only_this_machine_is_meant(client, made):
+    port = client.server.server_address[1]
+    for host in ("localhost", "127.0.0.1", f"localhost:{port}", f"LOCALHOST:{port}", "[::1]:80"):
+        assert client.ask("/status.json", Host=host).status == 200, host
+    for host in ("evil.example", f"evil.example:{port}", "localhost.evil.example", "127.0.0.1.evil.example", "", "evil@localhost"):
+        assert client.ask("/status.json", Host=host).status == 403, host
+    with served(made, host="0.0.0.0") as everywhere:
+        assert not everywhere.server.local and everywhere.ask("/status.json", Host="lab.example:80").status == 200
 
 
-def test_every_answer_has_headers_that_keep_other_places_out(out):
-    with served(out) as client:
-        for path, method in (("/", "GET"), ("/data.json", "GET"), ("/nothing", "GET"), ("/", "POST")):
-            headers = client.ask(path, method).headers
-            policy = headers["Content-Security-Policy"]
-            assert "default-src 'none'" in policy and "connect-src 'self'" in policy and "frame-ancestors 'none'" in policy
-            assert "unsafe-inline" not in policy.split("script-src")[1].split(";")[0]
-            assert headers["X-Content-Type-Options"] == "nosniff" and headers["Cross-Origin-Resource-Policy"] == "same-origin"
-            assert "Access-Control-Allow-Origin" not in headers
+def test_every_answer_has_headers_that_keep_other_places_out(client):
+    for path, method in (("/", "GET"), ("/data.json", "GET"), ("/nothing", "GET"), ("/", "POST")):
+        headers = client.ask(path, method).headers
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy and "connect-src 'self'" in policy and "frame-ancestors 'none'" in policy
+        assert "unsafe-inline" not in policy.split("script-src")[1].split(";")[0]
+        assert headers["X-Content-Type-Options"] == "nosniff" and headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert "Access-Control-Allow-Origin" not in headers
 
 
-def test_what_has_not_changed_is_not_sent_again(out):
-    with served(out) as client:
-        first = client.ask("/data.json")
-        assert first.headers["ETag"] == f'"{client.json("/status.json")["versions"]["data"]}"'
-        again = client.ask("/data.json", If_None_Match=first.headers["ETag"])
-        assert (again.status, again.content) == (304, b"")
-        assert json.loads(client.ask("/data.json", Accept_Encoding="gzip").content) == json.loads(first.content)
+def test_what_has_not_changed_is_not_sent_again(client):
+    first = client.ask("/data.json")
+    assert first.headers["ETag"] == f'"{client.json("/status.json")["versions"]["data"]}"'
+    again = client.ask("/data.json", If_None_Match=first.headers["ETag"])
+    assert (again.status, again.content) == (304, b"")
+    assert json.loads(client.ask("/data.json", Accept_Encoding="gzip").content) == json.loads(first.content)
 
 
-@pytest.mark.slow
-def test_a_study_that_grows_is_followed_and_finished_runs_are_not_read_again(out, monkeypatch):
+def test_a_study_that_grows_is_followed_and_finished_runs_are_not_read_again(out):
     with served(out, trust=True) as client:
-        before = client.json("/data.json")
-        read = []
-        original = Store.run
-
-        def run(self, cell, number):
-            read.append((type(self).__name__, number))
-            return original(self, cell, number)
-
-        monkeypatch.setattr(Store, "run", run)
-        looks = client.server.source._looker
-        for _ in range(3):
-            client.json("/status.json")
-            time.sleep(0.05)
-        assert looks.is_alive() and read == []  # nothing has changed
-        study(runs=3).run(out, executor=Inline())
-        status = client.until(lambda status: status["finished"] == 3)
-        assert (status["total"], status["failed"]) == (6, 3)
-        after = client.until(lambda found: len(found["comparisons"][0]["runs"]) == 3, "/data.json")
-        assert after["comparisons"][0]["runs"][0] == before["comparisons"][0]["runs"][0]
-        assert client.json(f"/details/{after['comparisons'][0]['runs'][2]['block']}.json")
-        client.until(lambda found: found["finished"] == 3, "/measures.json")
-    seen = [number for kind, number in read if kind == "CachedStore"]
-    assert seen and len(seen) <= 6 * 3  # the definition changed once, and each file a few times at most
+        (before,) = client.json("/data.json")["comparisons"]
+        known = client.server.followed.fronts
+        study(runs=2).run(out, executor=Inline())
+        status = client.json("/status.json")
+        assert (status["total"], status["finished"], status["failed"]) == (4, 2, 2)
+        (after,) = client.json("/data.json")["comparisons"]
+        assert after["runs"][0] == before["runs"][0] and len(after["runs"]) == 2
+        assert client.json(f"/details/{after['runs'][1]['block']}.json") and client.json("/measures.json")["finished"] == 2
+        read = client.server.followed.fronts
+        client.json("/status.json")
+        again = client.server.followed.fronts
+        assert len(known) == 1 and len(read) == 2 and all(again[name] is read[name] for name in read), "the same objects: nothing was read"
 
 
 def test_files_that_are_damaged_or_gone_are_named_and_the_server_goes_on(out):
@@ -239,22 +218,6 @@ def test_files_that_are_damaged_or_gone_are_named_and_the_server_goes_on(out):
         shutil.rmtree(out)
         assert "there is no folder" in client.until(lambda status: "no folder" in status["trouble"])["trouble"]
         assert client.ask("/").status == 200
-
-
-def test_a_front_that_goes_away_while_it_is_read_is_named_and_read_at_the_next_look(out, monkeypatch):
-    from runs.browser.live import study as module
-
-    original, gone = module._front_of, [1]
-
-    def front_of(run):
-        if gone and gone.pop():
-            raise FileNotFoundError("it has just gone")
-        return original(run)
-
-    monkeypatch.setattr(module, "_front_of", front_of)
-    with served(out) as client:
-        data = client.until(lambda found: found["comparisons"], "/data.json")
-        assert data["unreadable"] == [] and data["comparisons"][0]["runs"]
 
 
 def test_code_that_only_a_file_names_is_not_run(tmp_path, monkeypatch):
@@ -359,7 +322,7 @@ def test_fronts_are_followed_one_alone_and_those_of_a_folder(tmp_path):
 def test_wrong_calls_are_one_line(out, tmp_path, capsys):
     (tmp_path / "empty").mkdir()
     (tmp_path / "text.nc").write_text("no front", encoding="utf-8")
-    taken = Server(source_of(out))
+    taken = Server(followed(out))
     calls = (
         [str(tmp_path / "nothing")],
         [str(tmp_path / "empty")],

@@ -9,7 +9,7 @@ import pytest
 from chromium import NEEDS_CHROMIUM, errors, wait
 from misbehaving import Crashing, Gated, Plain, glide
 from synthetic_fronts import flights
-from test_serve import _impatient, process, served, study  # noqa: F401 - the fixture is used by all tests
+from test_serve import process, served, study
 from test_study import Inline
 
 from runs import Study

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from runs.measures.statistics import overall, pairwise, summarise
 from runs.report.comparison_tables import overall_table, pairs_table, summary_table
-from runs.report.tables import Column, escaped, latex_number, short, table
+from runs.report.tables import Head, escaped, latex_number, short, table
 
 EXAMPLE = table(
-    [Column("case", grouped=True), "solver", Column("GD", "1", digits=2), "runs"],
+    [Head("case", grouped=True), "solver", Head("GD", "1", digits=2), "runs"],
     [["orbit_rise", "MACS", 1.234e-4, 30], ["orbit_rise", "A & B", np.inf, np.int64(3)], ["goddard", "MACS", None, 0]],
     caption="100 % of the runs",
     notes=["Failed runs are worst."],
@@ -61,7 +61,7 @@ def test_files(tmp_path):
 
 
 def test_only_what_is_below_the_same_is_left_blank():
-    twice = table([Column("case", grouped=True), Column("first", grouped=True), "x"], [["a", "s", 1], ["a", "s", 2], ["b", "s", 3]])
+    twice = table([Head("case", grouped=True), Head("first", grouped=True), "x"], [["a", "s", 1], ["a", "s", 2], ["b", "s", 3]])
     assert [line.split() for line in twice.text().splitlines()[2:]] == [["a", "s", "1"], ["2"], ["b", "s", "3"]]
 
 

@@ -6,6 +6,8 @@ const SHARE = 4; // the page rests at least so many times as long as it took to 
 
 const held = {}; // versions of what is shown
 let unreadable = [];
+let comparing = false;
+let latest = {};
 
 async function ask(path) {
   const answer = await fetch(path);
@@ -21,7 +23,9 @@ async function follow() {
   const fresh = {};
   try {
     status = await ask("status.json");
-    for (const [name, version] of Object.entries(status.versions)) if (held[name] !== version) fresh[name] = await ask(`${name}.json`);
+    for (const name of ["data", "going"]) {
+      if (status.versions[name] && held[name] !== status.versions[name]) fresh[name] = await ask(`${name}.json`);
+    }
   } catch {
     const since = byId("trouble").dataset.since ?? new Date().toLocaleTimeString();
     byId("trouble").dataset.since = since;
@@ -31,8 +35,20 @@ async function follow() {
   delete byId("trouble").dataset.since;
   const began = performance.now();
   for (const name of Object.keys(fresh)) held[name] = status.versions[name];
+  latest = status;
   show(status, fresh);
+  compare(status.versions.measures);
   return Math.max(REST, SHARE * (performance.now() - began));
+}
+
+/** Ask for the comparison of solvers, which may take minutes: the page goes on meanwhile. */
+function compare(version) {
+  if (comparing || !version || held.measures === version) return;
+  comparing = true;
+  ask("measures.json").then((measures) => {
+    held.measures = version;
+    show(latest, { measures });
+  }).catch((error) => console.warn(error)).finally(() => { comparing = false; });
 }
 
 function show(status, { data, going, measures }) {
@@ -48,7 +64,6 @@ function show(status, { data, going, measures }) {
   if (status.total !== undefined) showStatus(status);
   if (data?.failures) showFailures(data.failures);
   if (state.measures) showMeasured(status);
-  if (status.reading) fill(byId("headline"), `${status.reading} \u2026`);
   tell([...(status.trouble ? [`Not readable now: ${status.trouble}.`] : []), ...unreadable]);
   if (state.data && canDraw()) document.documentElement.dataset.ready = "yes";
 }
@@ -85,5 +100,6 @@ function again(wait) {
 }
 
 begin();
+fill(byId("headline"), "Reading the files \u2026");
 again(0);
 document.addEventListener("DOMContentLoaded", drawFigures); // the drawing package is read by then

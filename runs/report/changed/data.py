@@ -22,7 +22,7 @@ from ...files import errors_begin_with
 from ..comparison import Comparison
 from ..flight_plots import representatives
 from ..plots import COLUMN, PAGE, new_figure, style
-from ..tables import Cell, Column, Table, table
+from ..tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,9 +100,9 @@ class ChangedData:
         return next(iter(self.changes[0].found.values())).goals
 
     def _shifts(self) -> Table:
-        heads: list[Column | str] = [*_WHOSE, "data", "points", "feasible"]
+        heads: list[Head | str] = [*_WHOSE, "data", "points", "feasible"]
         for goal in self._goals:
-            heads += [Column(f"{goal.name}: mean shift", goal.unit), Column(f"{goal.name}: largest", goal.unit)]
+            heads += [Head(f"{goal.name}: mean shift", goal.unit), Head(f"{goal.name}: largest", goal.unit)]
         rows: list[list[Cell]] = []
         for one in self.changes:
             for problem, front in one.simulated.items():
@@ -121,7 +121,7 @@ class ChangedData:
         return table(heads, rows, f"The front of {self.nominal} under changed data.", notes)
 
     def _points(self) -> Table:
-        heads: list[Column | str] = [*_WHOSE, Column("point", grouped=True), "data", "feasible", *_columns(self._goals)]
+        heads: list[Head | str] = [*_WHOSE, Head("point", grouped=True), "data", "feasible", *_columns(self._goals)]
         rows: list[list[Cell]] = []
         for one in self.changes:
             for number, k in enumerate(representatives(one.nominal, FEW) if one.simulated else [], 1):
@@ -131,7 +131,7 @@ class ChangedData:
         return table(heads, rows, f"Points of the front of {self.nominal}, each under changed data with the same controls.")
 
     def _best(self) -> Table:
-        heads: list[Column | str] = [*_WHOSE, "optimised under", "points", *_columns(self._goals)]
+        heads: list[Head | str] = [*_WHOSE, "optimised under", "points", *_columns(self._goals)]
         rows: list[list[Cell]] = []
         for one in self.changes:
             for problem, front in one.found.items():
@@ -141,11 +141,11 @@ class ChangedData:
         return table(heads, rows, "The best of each objective that was found under each data, all runs together.")
 
 
-_WHOSE = (Column("transcription", grouped=True), Column("solver", grouped=True))
+_WHOSE = (Head("transcription", grouped=True), Head("solver", grouped=True))
 
 
-def _columns(goals: Sequence[Any]) -> list[Column]:
-    return [Column(goal.name, goal.unit, digits=5) for goal in goals]
+def _columns(goals: Sequence[Any]) -> list[Head]:
+    return [Head(goal.name, goal.unit, digits=5) for goal in goals]
 
 
 def changed_data(comparisons: Sequence[Comparison], study: Mapping[str, Any]) -> list[ChangedData]:

@@ -16,7 +16,7 @@ from ...measures.references import module_of
 from ..comparison import Comparison
 from ..flight_plots import representatives
 from ..plots import PAGE, new_figure, style
-from ..tables import Cell, Column, Table, table
+from ..tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,8 +78,8 @@ class DispersedFront:
 
     def _table(self, way: str) -> Table:
         goals, measured = self.points.goals, self.measures[way]
-        heads: list[Column | str] = ["point", *(Column(f"nominal {goal.name}", goal.unit, digits=5) for goal in goals)]
-        heads += [Column(name, unit, digits=4) for name, unit in measured[0]]
+        heads: list[Head | str] = ["point", *(Head(f"nominal {goal.name}", goal.unit, digits=5) for goal in goals)]
+        heads += [Head(name, unit, digits=4) for name, unit in measured[0]]
         rows: list[list[Cell]] = [[number, *self.points.objectives[number].tolist(), *one.values()] for number, one in enumerate(measured)]
         note = (
             f"{self.settings}: standard deviations of normal distributions; the same draws for all points. Shares are of all cases; "

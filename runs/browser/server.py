@@ -16,16 +16,13 @@ import sys
 from functools import lru_cache
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import msgspec
 
-from ..page import LIVE_POLICY, live_page, live_scripts, plotly
-from .fronts import FrontsSource
-from .source import Source
-from .study import StudySource
+from .live import Followed
+from .page import LIVE_POLICY, live_page, live_scripts, plotly
 
 log = logging.getLogger(__name__)
 
@@ -40,24 +37,15 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
 }
 HTML, SCRIPT, JSON = "text/html; charset=utf-8", "text/javascript; charset=utf-8", "application/json"
-SMALL = 1000
-"""Bytes that are not worth compressing."""
-
-
-def source_of(path: Path, trust: bool = False) -> Source:
-    """What is shown of a path: a study's folder, a front, or a folder of fronts. Raises ValueError if it is none of these."""
-    if not path.exists():
-        raise ValueError(f"there is no file or folder '{path}'")
-    return StudySource(path, trust) if (path / "study.json").exists() else FrontsSource(path)
 
 
 class Server(ThreadingHTTPServer):
-    """A server of one source."""
+    """A server of one page."""
 
     daemon_threads = True
 
-    def __init__(self, source: Source, host: str = "127.0.0.1", port: int = 0) -> None:
-        self.source, self.page = source, live_page(source.title)
+    def __init__(self, followed: Followed, host: str = "127.0.0.1", port: int = 0) -> None:
+        self.followed, self.page = followed, live_page(followed.title)
         plotly()
         try:
             self.address_family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
@@ -108,7 +96,7 @@ class Handler(BaseHTTPRequestHandler):
         if version and self.headers.get("If-None-Match") == f'"{version}"':
             self._send(HTTPStatus.NOT_MODIFIED, kind, b"", version)
             return
-        if not packed and len(content) > SMALL and "gzip" in self.headers.get("Accept-Encoding", ""):
+        if not packed and len(content) > 1000 and "gzip" in self.headers.get("Accept-Encoding", ""):
             content, packed = _compressed(content), True
         self._send(HTTPStatus.OK, kind, content, version, packed)
 
@@ -126,7 +114,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def _found(self, path: str) -> tuple[str, bytes, str, bool] | None:
         """Kind, content, version and whether it is compressed, of a route; None if there is none."""
-        source = self.server.source
+        followed = self.server.followed
         if path == "/":
             return HTML, self.server.page, "", False
         if path == "/plotly.js":
@@ -134,10 +122,10 @@ class Handler(BaseHTTPRequestHandler):
         if path == "/scripts.js":
             return SCRIPT, live_scripts(), "", False
         if path == "/status.json":
-            return JSON, msgspec.json.encode(source.status()), "", False
-        if (named := re.fullmatch(r"/(data|going|measures)\.json", path)) and (resource := source.resources().get(named[1])):
-            return JSON, resource.content, resource.version, False
-        if (named := re.fullmatch(r"/details/([0-9a-f-]{1,40})\.json", path)) and (content := source.details(named[1])):
+            return JSON, msgspec.json.encode(followed.status()), "", False
+        if (named := re.fullmatch(r"/(data|going|measures)\.json", path)) and (answer := followed.answer(named[1])):
+            return JSON, answer.content, answer.version, False
+        if (named := re.fullmatch(r"/details/([0-9a-f-]{1,40})\.json", path)) and (content := followed.details(named[1])):
             return JSON, content, "", True
         return None
 

@@ -1,1 +1,0 @@
-"""Pages in Markdown that keep a report in the project's documentation."""
