@@ -7,11 +7,11 @@ the controls, and the time is free. Betts, "Practical Methods for Optimal Contro
 
 from macs import optimize
 from problems import load
-from problems.cases.betts import CROSS_RANGE, FINAL_TIME
+from problems.cases.reentry.cases import OPTIMA
 
 best = optimize(load("betts"))
 print(best.alone().table())
-print(f"final time {best.trajectory['entry'].tf:.2f} s; Betts: {CROSS_RANGE} deg after {FINAL_TIME} s")
+print("final time {:.2f} s; Betts: {} deg after {} s".format(best.trajectory["entry"].tf, *OPTIMA["betts"]))
 best.plot(costates=True)
 
 # What was learned

@@ -6,11 +6,11 @@ Optimal Control and Estimation Using Nonlinear Programming", SIAM 2010, section 
 
 from macs import optimize
 from problems import load
-from problems.cases.betts_heating import CROSS_RANGE, FINAL_TIME
+from problems.cases.reentry.cases import OPTIMA
 
 best = optimize(load("betts_heating"))
 print(best.alone().table())
-print(f"final time {best.trajectory['entry'].tf:.2f} s; Betts: {CROSS_RANGE} deg after {FINAL_TIME} s")
+print("final time {:.2f} s; Betts: {} deg after {} s".format(best.trajectory["entry"].tf, *OPTIMA["betts_heating"]))
 best.plot(costates=True)
 
 # What was learned

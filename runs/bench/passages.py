@@ -12,8 +12,7 @@ import numpy as np
 from scipy.integrate import solve_bvp
 
 from macs.io.console import Steps
-from problems.cases.aerocapture.passage import PASSAGE, Passage, Passages, passages
-from problems.cases.aerocapture.passage_table import tabulated
+from problems.cases.aerocapture.passage import PASSAGE, Passage, Passages, passages, tabulated
 
 from .contract import Bench, Effort, Row, Target, column, rounds_of, side_by_side
 

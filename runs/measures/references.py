@@ -107,8 +107,8 @@ def closed_form(case: str, data: Mapping[str, Any] = MappingProxyType({})) -> np
 
 
 def called(case: str) -> tuple[str, bool]:
-    """The name of a case's closed form, and whether it is the truth; it is not if the case names it by `REFERENCE`."""
-    what = getattr(module_of(case), "REFERENCE", None)
+    """The name of a case's closed form, and whether it is the truth; it is not if the case has a `reference_name`."""
+    what = getattr(module_of(case), "reference_name", None)
     return (what, False) if what else ("the true front", True)
 
 

@@ -14,7 +14,7 @@ from macs.fronts.verification import verify
 from macs.gradient_solvers import Sweep
 from macs.solvers.checkpoint import Unreadable
 from problems import load
-from problems.cases import four_bar_truss
+from problems.cases.structures import four_bar_truss_reference
 from transcription import DFET, Collocation, SingleShooting
 
 
@@ -85,7 +85,7 @@ def test_rows_beyond_the_budget_are_those_of_the_fingerprint_and_those_evaluated
 @pytest.mark.slow
 def test_the_truss_is_found_to_its_closed_form():
     found = MACS(archive=20).solve(load("four_bar_truss"), seed=1)
-    truth = four_bar_truss.reference()
+    truth = four_bar_truss_reference()
     ranges = np.ptp(truth, axis=0)
     distances = np.linalg.norm((found.objectives[:, None] - truth) / ranges, axis=2).min(axis=1)
     assert found.stats["stopped"] == "done" and found.stats["evaluations"] <= 20_000 and distances.mean() < 2e-3

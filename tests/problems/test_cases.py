@@ -1,3 +1,5 @@
+"""Ascent, orbit rise and landing sites: statements against the papers, true fronts against other code."""
+
 from __future__ import annotations
 
 import math
@@ -7,19 +9,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
+from macs import optimize
+from macs.pareto.dominance import nondominated
 from problems import load
-from problems.cases import goddard
-
-
-def test_the_shortest_ascent_is_bang_bang():
-    a, g, h = goddard.THRUST, goddard.GRAVITY, goddard.HEIGHT
-    assert goddard.shortest_time() == pytest.approx(math.sqrt(2 * h * (1 / (a - g) + 1 / (a + g))), rel=1e-14)
-    assert goddard.shortest_time() == pytest.approx(109.10894511799619, rel=1e-14)
-    # Flown: up at a - g until the speed is what a + g kills before the height is reached.
-    up = math.sqrt(2 * h / (a - g) * (a + g) / (2 * a))
-    fall = (a - g) * up / (a + g)
-    assert up + fall == pytest.approx(goddard.shortest_time(), rel=1e-12)
-    assert (a - g) * up**2 / 2 + (a - g) * up * fall - (a + g) * fall**2 / 2 == pytest.approx(h)
+from problems.cases import goddard, landing_site, orbit_rise
+from runs import gd
+from transcription import DFET
 
 
 def test_the_longest_ascent_has_the_speed_of_the_literature():
@@ -87,18 +82,6 @@ def test_the_orbit_rise_is_the_papers(name):
     assert [goal.sense for goal in compiled.goals] == ["minimize", "maximize"]
 
 
-def test_without_thrust_the_orbit_is_a_circle():
-    phase = load("orbit_rise").compile().phases[0]
-
-    def rates(t, x):
-        coast = np.array(phase.dynamics(x, [0.0], t, [0, 30])).ravel()
-        coast[1] -= 0.01
-        return coast
-
-    end = solve_ivp(rates, (0, 30), [v[0] for v in phase.initial], rtol=1e-10, atol=1e-12).y[:, -1]
-    assert end == pytest.approx([1.1, 0, 30 * 1.1**-1.5, 1.1**-0.5], abs=1e-7)
-
-
 @pytest.mark.parametrize("tf", [goddard.shortest_time(), 110.0, 150.0, 250.0])
 def test_the_optimal_ascent_is_a_flight_of_its_control_and_ends_where_the_front_says(tf):
     flight = goddard.optimal_flight(tf, points=20_001)
@@ -124,3 +107,96 @@ def test_no_ascent_is_shorter_than_the_shortest():
     with pytest.raises(ValueError, match="the shortest one takes"):
         goddard.optimal_flight(100.0)
     assert goddard.optimal_flight(goddard.shortest_time() * (1 - 1e-4))["time"][-1] == goddard.shortest_time()
+
+
+A = orbit_rise.ACCELERATION
+
+
+def hamiltonian_flow(_: float, y: np.ndarray) -> list[float]:
+    """States r, vr, vt and costates under the angle that maximises the Hamiltonian: thrust along the costate of the velocity."""
+    r, vr, vt, lr, lvr, lvt = y
+    norm = np.hypot(lvr, lvt)
+    return [
+        vr,
+        vt**2 / r - 1 / r**2 + A * lvr / norm,
+        -vt * vr / r + A * lvt / norm,
+        lvr * (vt**2 / r**2 - 2 / r**3) - lvt * vt * vr / r**2,
+        -lr + lvt * vt / r,
+        -2 * lvr * vt / r + lvt * vr / r,
+    ]
+
+
+def test_rows_satisfy_the_necessary_conditions() -> None:
+    for tf, energy, *costates in orbit_rise.reference_with_costates()[::24]:
+        start = [orbit_rise.START_RADIUS, 0.0, orbit_rise.START_RADIUS**-0.5, *costates]
+        r, vr, vt, lr, lvr, lvt = solve_ivp(hamiltonian_flow, (0.0, tf), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        assert abs((vr**2 + vt**2) / 2 - 1 / r - energy) < 1e-9
+        np.testing.assert_allclose([lr, lvr, lvt], [1 / r**2, vr, vt], atol=1e-8)
+
+
+def test_the_table_is_a_front() -> None:
+    reference = orbit_rise.reference()
+    assert reference.shape == (241, 2)
+    assert (np.diff(reference, axis=0) > 0).all()
+    np.testing.assert_allclose(-reference[[0, -1], 1], [0.28345965587, -0.05344446957], atol=1e-10)
+
+
+@pytest.mark.slow
+def test_the_optimal_flight_is_a_flight_of_its_control_and_ends_where_the_front_says() -> None:
+    for tf in (20.0, 33.3, 80.0):
+        flight = orbit_rise.optimal_flight(tf, points=4001)
+        t = flight["time"]
+
+        def rates(time: float, x: np.ndarray, t=t, flight=flight) -> list[float]:
+            (r, vr, _, vt), u = x, np.interp(time, t, flight["u"])
+            return [vr, vt**2 / r - 1 / r**2 + A * np.cos(u), vt / r, -vt * vr / r + A * np.sin(u)]
+
+        found = solve_ivp(rates, (0.0, tf), [orbit_rise.START_RADIUS, 0.0, 0.0, orbit_rise.START_RADIUS**-0.5], rtol=1e-9, atol=1e-10)
+        r, vr, theta, vt = found.y[:, -1]
+        np.testing.assert_allclose([r, vr, theta, vt], [flight[name][-1] for name in ("r", "vr", "theta", "vt")], atol=1e-6)
+        reference = orbit_rise.reference()
+        near = np.argsort(np.abs(reference[:, 0] - tf))[:4]
+        expected = np.polynomial.Polynomial.fit(*reference[near].T, 3)(tf)
+        assert abs((vr**2 + vt**2) / 2 - 1 / r - expected) < 1e-6
+    with pytest.raises(ValueError, match="from 20 to 80"):
+        orbit_rise.optimal_flight(81.0)
+
+
+@pytest.mark.slow
+def test_least_effort_is_that_of_an_optimal_flight():
+    point = optimize(landing_site.problem(landers=1), DFET(1, 3), objective="hazard", start=np.full((1, 8), 1e-3), starts=1)
+    flight = point.trajectory["divert"].at(landing_site.DURATION)
+    site = flight["x1"], flight["y1"]
+    assert point.objectives["hazard"] == pytest.approx(landing_site.hazard(*site), rel=1e-9)
+    # The cheapest flight to this very site, on a finer mesh: the thrust is linear in time, so that finer meshes gain nothing.
+    problem = landing_site.problem(landers=1)
+    for axis, goal in zip("xy", site, strict=True):
+        problem.constraint(f"there {axis}", problem.phases["divert"].final(problem.phases["divert"][f"{axis}1"]), lower=goal, upper=goal)
+    for mesh in (DFET(1, 3), DFET(3, 4)):
+        best = optimize(problem, mesh, objective="effort", starts=1)
+        assert best.objectives["effort"] == pytest.approx(landing_site.least_effort(*site), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_the_front_of_one_is_that_of_a_scan_of_the_ground():
+    axis = np.linspace(-1.0, landing_site.REACH, 1401)
+    x, y = np.meshgrid(axis, axis)
+    sites = np.stack([landing_site.least_effort(x, y).ravel(), landing_site.hazard(x, y).ravel()], axis=1)
+    scan = sites[nondominated(sites)]
+    truth = landing_site.reference(landers=1)
+    scan = scan[scan[:, 0] <= truth[-1, 0]]
+    assert gd(scan, truth) < 1e-3 and gd(truth, scan) < 2e-3
+    assert len(scan) > 300
+
+
+@pytest.mark.slow
+def test_a_team_is_no_better_than_its_members():
+    """Random teams of optimal and other members are nowhere below the front of teams."""
+    rng = np.random.default_rng(0)
+    truth, x, y = landing_site.reference(), *rng.uniform(-1, 3, (2, 20_000, 3))
+    teams = np.stack([landing_site.least_effort(x, y).sum(axis=1), landing_site.hazard(x, y).sum(axis=1)], axis=1)
+    one = landing_site.single()
+    teams = np.vstack([teams, one[rng.integers(len(one), size=(20_000, 3))].sum(axis=1)])
+    slack = 2e-3 * np.ptp(truth, axis=0)
+    reached = np.searchsorted(truth[:, 0], teams[:, 0] + slack[0], side="right") - 1
+    assert (teams[:, 1] >= truth[reached, 1] - slack[1]).all()

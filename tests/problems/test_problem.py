@@ -1,5 +1,8 @@
+"""Statements: what is refused, by the user's own names, and what is read back."""
+
 from __future__ import annotations
 
+import itertools
 import math
 
 import casadi as ca
@@ -7,37 +10,29 @@ import numpy as np
 import pytest
 from statements import INF, NAN, bare, glider, refused
 
-from problems import Problem
+from problems import Phase, Problem
 
 # Numbers
 
 
-@pytest.mark.parametrize(
-    "bounds",
-    [
-        (1, 0),
-        (0, INF),
-        (-INF, 0),
-        (NAN, 1),
-        (0, None),
-        None,
-        3,
-        (0, 1, 2),
-        "01",
-        ("0", "1"),
-        (0, 1j),
-        (0, 10**400),
-        (0, ca.MX.sym("q")),
-        ca.DM([0, 1, 2]),
-        (0, np.array([1.0, 2.0])),
-        {"a": 1, "b": 2},
-        (0, ca.SX.sym("s")),
-        (),
-        [[0, 1], [2, 3]],
-        np.ones((2, 40)),
-    ],
-    ids=str,
-)
+BAD_BOUNDS = [
+    (1, 0),
+    (0, INF),
+    (NAN, 1),
+    (0, None),
+    None,
+    3,
+    (0, 1, 2),
+    ("0", "1"),
+    (0, 1j),
+    (0, 10**400),
+    (0, ca.MX.sym("q")),
+    {"a": 1},
+    (),
+]
+
+
+@pytest.mark.parametrize("bounds", BAD_BOUNDS, ids=str)
 def test_bad_bounds_are_refused_with_the_name_of_the_variable(bounds):
     problem, phase = bare()
     refused(lambda: phase.state("height", bounds=bounds), "height", "descent")
@@ -45,30 +40,22 @@ def test_bad_bounds_are_refused_with_the_name_of_the_variable(bounds):
     refused(lambda: problem.parameter("mass", bounds=bounds), "mass", "glider")
 
 
-@pytest.mark.parametrize(
-    "bounds",
-    [(0, 1), [0, 1], np.array([0, 1]), (np.float32(0), np.int64(1)), (ca.DM(0), ca.DM(1)), (np.array(0.0), np.array(1)), (ca.MX(0), 1)],
-    ids=str,
-)
+@pytest.mark.parametrize("bounds", [[0, 1], np.array([0, 1]), (np.float32(0), np.int64(1)), (ca.DM(0), ca.DM(1)), (ca.MX(0), 1)], ids=str)
 def test_numbers_of_every_kind_are_bounds(bounds):
-    _, phase = bare()
-    phase.state("height", bounds=bounds, initial=bounds[0], final=bounds)
-    compiled_state = phase._states["height"]
-    assert (compiled_state.lower, compiled_state.upper) == (0.0, 1.0)
-    assert phase._initial["height"] == (0.0, 0.0) and phase._final["height"] == (0.0, 1.0)
-
-
-def test_a_state_of_one_value_only_is_refused():
-    refused(lambda: bare()[1].state("height", bounds=(2, 2)), "height")
+    problem, phase = glider()
+    phase.state("speed", bounds=bounds, initial=bounds[0], final=bounds)
+    phase._rates |= {"speed": ca.MX(0)}
+    (own,) = problem.compile().phases
+    assert (own.states[1].lower, own.states[1].upper) == own.final[1] == (0.0, 1.0) and own.initial[1] == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("word", ["initial", "final"])
-@pytest.mark.parametrize("value", [11, -0.1, (0, 11), (-1, 5), NAN, INF, (6, 5), "5", (1, 2, 3), ca.MX.sym("q")], ids=str)
+@pytest.mark.parametrize("value", [11, (0, 11), NAN, (6, 5), "5"], ids=str)
 def test_values_outside_bounds_are_refused(word, value):
     refused(lambda: bare()[1].state("height", bounds=(0, 10), **{word: value}), "height", "descent", word)
 
 
-@pytest.mark.parametrize("scale", [0, -1, NAN, INF, "1", ca.MX.sym("q")], ids=str)
+@pytest.mark.parametrize("scale", [0, -1, NAN, "1"], ids=str)
 def test_scales_are_positive_numbers(scale):
     problem, phase = glider()
     refused(lambda: phase.state("speed", bounds=(0, 1), scale=scale), "speed")
@@ -86,7 +73,7 @@ def test_bad_times_are_refused(times):
     refused(lambda: glider(**times), "descent", next(iter(times)))
 
 
-@pytest.mark.parametrize("duration", [-1, (-2, -1), 0, (-1, 2), (0, 0), (2, 1), INF, NAN])
+@pytest.mark.parametrize("duration", [-1, 0, (-1, 2), (2, 1), INF])
 def test_durations_are_positive(duration):
     refused(lambda: glider(duration=duration), "descent", "duration")
 
@@ -101,7 +88,7 @@ def test_a_duration_that_the_times_do_not_allow_is_refused(duration):
     refused(lambda: glider(duration=duration)[0].compile(), "descent", "duration")
 
 
-@pytest.mark.parametrize("period", [0, -6, 3, NAN, INF, "2", 2.01])
+@pytest.mark.parametrize("period", [0, 3, NAN, "2"])
 def test_a_period_is_the_width_of_the_bounds(period):
     refused(lambda: bare()[1].control("bank", bounds=(-1, 1), period=period), "bank")
 
@@ -123,7 +110,7 @@ def test_bad_limits_are_refused(limits):
 # Names
 
 
-@pytest.mark.parametrize("name", ["", " ", None, 3, ca.MX.sym("x")], ids=str)
+@pytest.mark.parametrize("name", ["", " ", None, 3], ids=str)
 def test_names_are_words(name):
     problem, phase = glider()
     refused(lambda: Problem(name))
@@ -257,17 +244,6 @@ def test_default_scales_are_spans():
     assert [v.scale for v in compiled.limits] == [5, 9]
 
 
-def test_names_may_hold_spaces_and_any_letters():
-    problem = Problem("Höhe über Grund")
-    phase = problem.phase("Phase α", t0=0, tf=1)
-    x = phase.state("h [km]", bounds=(0, 1))
-    u = phase.control("δ*", bounds=(0, 1))
-    phase.dynamics(**{"h [km]": u})
-    phase.path("q̇ ≤ 1", x, upper=1)
-    problem.minimize("Δ v'\"", phase.final(x))
-    assert problem.compile().fingerprint
-
-
 def test_bounds_that_rounding_cannot_tell_apart_are_one_value():
     def pair(value):
         return value, math.nextafter(value, INF)
@@ -285,8 +261,291 @@ def test_bounds_that_rounding_cannot_tell_apart_are_one_value():
     assert all(one.lower == one.upper for one in ranges)
 
 
-def test_times_that_durations_narrow_to_one_value_are_fixed():
-    """Within (0.3, 5), a start at 0.1 and a duration of 0.2 leave 0.1 + 0.2 alone, which is more than 0.3 by rounding."""
-    problem, _ = glider(t0=0.1, tf=(0.3, 5), duration=(0.2, math.nextafter(0.2, INF)))
-    (own,) = problem.compile().phases
-    assert own.tf.lower == own.tf.upper and own.tf.scale == 1.0
+# Links
+
+
+def relay(count: int = 3) -> tuple[Problem, list[Phase]]:
+    problem = Problem("relay")
+    phases = []
+    for i in range(count):
+        phase = problem.phase(f"leg {i}", t0=(0, 10), tf=(0, 10))
+        x = phase.state("x", bounds=(0, 10))
+        phase.state(f"own {i}", bounds=(0, 10))
+        phase.dynamics(**{"x": 1, f"own {i}": x})
+        phases.append(phase)
+    problem.minimize("time", phases[-1].tf)
+    return problem, phases
+
+
+def test_links_take_phases_of_this_problem():
+    problem, legs = relay()
+    _, stranger = glider()
+    for pair in ((legs[0], stranger), (stranger, legs[0]), ("leg 0", legs[1]), (legs[0], None)):
+        refused(lambda pair=pair: problem.link(*pair), "relay", "link")
+
+
+def test_links_take_states_of_both_phases():
+    problem, legs = relay()
+    refused(lambda: problem.link(legs[0], legs[1], states=["own 0"]), "own 0", "leg 0", "leg 1")
+    refused(lambda: problem.link(legs[0], legs[1], states="y"), "y", "leg 0", "leg 1")
+    problem.link(legs[0], legs[1], states="x")
+    problem.link(legs[1], legs[2], states=())
+    assert [link.states for link in problem.compile().links] == [("x",), ()]
+
+
+def test_links_do_not_close_a_circle():
+    problem, legs = relay()
+    refused(lambda: problem.link(legs[0], legs[0]), "leg 0")
+    problem.link(legs[0], legs[1])
+    refused(lambda: problem.link(legs[0], legs[1]), "leg 0", "leg 1", "twice")
+    refused(lambda: problem.link(legs[1], legs[0]), "leg 0", "leg 1", "circle")
+    problem.link(legs[1], legs[2])
+    refused(lambda: problem.link(legs[2], legs[0]), "leg 2", "leg 0", "circle")
+
+
+def test_a_link_stated_before_the_states_still_joins_them():
+    problem = Problem("relay")
+    first, second = problem.phase("up", t0=0, tf=1), problem.phase("down", t0=1, tf=2)
+    problem.link(first, second)
+    for phase in (first, second):
+        phase.state("x", bounds=(0, 1))
+        phase.dynamics(x=1)
+    problem.minimize("time", second.tf)
+    assert problem.compile().links[0].states == ("x",)
+
+
+def test_a_jump_of_a_state_that_a_link_continues_is_refused_by_name():
+    problem, legs = relay()
+    problem.link(legs[0], legs[1])
+    problem.constraint("drop", legs[0].final(legs[0]["x"]) - legs[1].initial(legs[1]["x"]), lower=2.0)
+    refused(problem.compile, "drop", "link", "at least 2")
+    problem, legs = relay()
+    problem.link(legs[0], legs[1], states=[])
+    problem.constraint("drop", legs[0].final(legs[0]["x"]) - legs[1].initial(legs[1]["x"]), lower=2.0)
+    problem.constraint("as before", legs[0].final(legs[0]["x"]) - legs[0].final(legs[0]["x"]), upper=0.0)
+    problem.compile()
+
+
+def test_links_that_leave_nothing_are_refused():
+    problem, legs = relay(2)
+    third = problem.phase("late", t0=11, tf=12)
+    third.state("x", bounds=(0, 1))
+    third.dynamics(x=1)
+    problem.link(legs[0], third)
+    refused(problem.compile, "leg 0", "late", "time")
+    problem = Problem("relay")
+    first, second = problem.phase("up", t0=0, tf=1), problem.phase("down", t0=1, tf=2)
+    for phase, bounds in ((first, (0, 1)), (second, (2, 3))):
+        phase.state("x", bounds=bounds)
+        phase.dynamics(x=1)
+    problem.link(first, second)
+    problem.minimize("time", second.tf)
+    refused(problem.compile, "up", "down", "'x'")
+
+
+def ranges(problem: Problem) -> dict[str, tuple[float, float, float, float]]:
+    return {p.name: (p.t0.lower, p.t0.upper, p.tf.lower, p.tf.upper) for p in problem.compile().phases}
+
+
+def test_times_are_narrowed_by_durations():
+    assert ranges(glider(tf=(0, 100), duration=(2, 5))[0]) == {"descent": (0, 0, 2, 5)}
+    assert ranges(glider(t0=(0, 10), tf=8, duration=3)[0]) == {"descent": (5, 5, 8, 8)}
+    assert ranges(glider(t0=(4, 10), tf=(0, 6))[0]) == {"descent": (4, 6, 4, 6)}
+
+
+def test_times_are_narrowed_along_links_both_ways():
+    problem, legs = relay()
+    for first, second in itertools.pairwise(legs):
+        problem.link(first, second)
+    last = problem.phase("last", t0=(0, 10), tf=7, duration=(3, 10))
+    last.state("x", bounds=(2, 4), initial=3)
+    last.dynamics(x=0)
+    problem.link(legs[2], last)
+    for times in ranges(problem).values():
+        assert times[1] <= 4
+    compiled = problem.compile()
+    assert compiled.phases[2].final[0] == (3, 3) and compiled.phases[3].initial[0] == (3, 3)
+
+
+# Guesses
+
+
+BAD_GUESSES = [
+    NAN,
+    "5",
+    None,
+    (1, 2, 3),
+    ([0, 1], [1]),
+    ([0], [1]),
+    ([1, 0], [1, 2]),
+    ([0, 1], [1, NAN]),
+    ([0, 1], ["a", "b"]),
+    (1, [2, 3]),
+    {},
+]
+
+
+@pytest.mark.parametrize("value", BAD_GUESSES, ids=str)
+def test_bad_guesses_are_refused(value):
+    refused(lambda: glider()[1].guess(height=value), "height", "descent", "guess")
+
+
+@pytest.mark.parametrize("value", [3, np.array(3), [1, 2], np.array([1, 2]), ([0, 1, 2], [5, 4, 3]), (np.arange(3), range(3))], ids=str)
+def test_guesses_of_every_kind_are_taken(value):
+    glider()[1].guess(height=value)
+
+
+def test_guesses_of_unknown_names_and_outside_bounds_are_refused():
+    problem, phase = glider()
+    problem.parameter("mass", bounds=(1, 2))
+    refused(lambda: phase.guess(speed=1), "speed", "descent", "height")
+    refused(lambda: problem.guess(weight=1), "weight", "glider", "mass")
+    refused(lambda: problem.guess(mass=NAN), "mass", "glider")
+    refused(lambda: problem.guess(mass=3), "mass", "glider", "(1, 2)")
+    refused(lambda: phase.guess(height=11), "height", "descent")
+    refused(lambda: phase.guess(height=(5, -1)), "height", "descent")
+    refused(lambda: phase.guess(flap=([0, 1], [0, 2])), "flap", "descent")
+    refused(lambda: phase.guess(tf=3), "tf", "descent")
+    refused(lambda: phase.guess(tf=(1, 2)), "tf", "descent")
+    phase.guess(height=(0, 10), flap=1, tf=2, t0=0)
+    problem.guess(mass=1)
+
+
+# Expressions
+
+
+def test_every_state_needs_a_rate_and_nothing_else_has_one():
+    _, phase = bare()
+    phase.state("height", bounds=(0, 1))
+    phase.state("speed", bounds=(0, 1))
+    refused(lambda: phase.dynamics(height=1), "descent", "[height]", "[height, speed]")
+    refused(lambda: phase.dynamics(height=1, speed=1, mass=1), "descent", "mass")
+    phase.dynamics(speed=1, height=2)
+    refused(lambda: phase.dynamics(height=1, speed=1), "descent", "twice")
+
+
+def test_every_state_has_a_rate_when_the_problem_is_compiled():
+    problem, phase = glider()
+    phase.state("speed", bounds=(0, 1))
+    refused(problem.compile, "descent", "speed")
+    problem, phase = bare()
+    phase.state("height", bounds=(0, 1))
+    problem.minimize("time", phase.tf)
+    refused(problem.compile, "descent", "height")
+
+
+def test_a_problem_needs_a_phase_an_objective_and_states():
+    refused(lambda: Problem("empty").compile(), "empty", "phase")
+    problem, phase = bare()
+    refused(problem.compile, "glider", "objective")
+    problem.minimize("time", phase.tf)
+    refused(problem.compile, "descent", "state")
+
+
+def strangers() -> dict[str, ca.MX]:
+    other_problem, other = glider()
+    return {
+        "q": ca.MX.sym("q"),
+        "height": other["height"],
+        "mass": other_problem.parameter("mass", bounds=(0, 1)),
+        "tf of descent": other.tf,
+        "final(height)": other.final(other["height"]),
+    }
+
+
+@pytest.mark.parametrize("name", strangers())
+def test_symbols_of_another_problem_are_refused(name):
+    problem, phase = glider()
+    alien = strangers()[name]
+    for expression in (alien, phase.tf * alien, ca.if_else(alien > 0, 1, phase.tf)):
+        refused(lambda e=expression: phase.path("load", e, upper=1), name, "load", "descent")
+        refused(lambda e=expression: problem.constraint("fuel", e, upper=1), name, "fuel", "glider")
+        refused(lambda e=expression: problem.minimize("cost", e), name, "cost", "glider")
+        for kind in ("initial", "final", "integral", "peak"):
+            refused(lambda e=expression, kind=kind: getattr(phase, kind)(e), name, "descent", kind)
+    refused(lambda: bare_dynamics(alien), name, "height", "descent")
+
+
+def bare_dynamics(rate):
+    _, phase = bare()
+    phase.state("height", bounds=(0, 1))
+    phase.dynamics(height=rate)
+
+
+def test_symbols_of_another_phase_are_refused_along_a_phase():
+    problem, phase = glider()
+    second = problem.phase("landing", t0=2, tf=3)
+    distance = second.state("distance", bounds=(0, 1))
+    refused(lambda: second.dynamics(distance=phase["height"]), "height", "distance", "landing")
+    refused(lambda: second.path("load", phase.time, upper=1), "time of descent", "landing")
+    refused(lambda: second.integral(phase.tf), "tf of descent", "landing")
+    refused(lambda: phase.peak(distance), "distance", "descent")
+
+
+def test_raw_states_controls_and_time_are_refused_in_objectives_and_constraints():
+    problem, phase = glider()
+    for symbol, name in ((phase["height"], "height"), (phase["flap"], "flap"), (phase.time, "time of descent")):
+        refused(lambda s=symbol: problem.minimize("cost", phase.tf + s), name, "cost", "final(...)")
+        refused(lambda s=symbol: problem.constraint("fuel", s, upper=1), name, "fuel", "final(...)")
+
+
+def test_quantities_are_refused_along_a_phase():
+    _, phase = glider()
+    for kind in ("initial", "final", "integral", "peak"):
+        quantity = getattr(phase, kind)(phase["height"])
+        refused(lambda q=quantity: phase.path("load", q - phase["height"], upper=1), f"{kind}(height)", "load")
+        refused(lambda q=quantity: phase.integral(q * phase.time), f"{kind}(height)", "integral")
+        refused(lambda q=quantity: bare_dynamics(q), f"{kind}(height)")
+
+
+@pytest.mark.parametrize("value", [None, "1", NAN, ca.MX(1) / 0, [1], ca.MX.sym("v", 2), ca.MX(0, 0), ca.SX.sym("s"), np.ones(2)], ids=str)
+def test_expressions_are_scalars_and_numbers(value):
+    problem, phase = glider()
+    refused(lambda: phase.path("load", value, upper=1), "load")
+    refused(lambda: phase.final(value), "final", "descent")
+    refused(lambda: problem.minimize("cost", value), "cost")
+    refused(lambda: problem.constraint("fuel", value, upper=1), "fuel")
+    refused(lambda: bare_dynamics(value), "height")
+
+
+def broken(kind: str, value) -> Problem:
+    problem, phase = glider()
+    x = phase["height"]
+    bad = value(x)
+    if kind in ("initial", "final", "integral", "peak"):
+        problem.minimize("cost", getattr(phase, kind)(bad))
+    elif kind == "path":
+        phase.path("load", bad, upper=1)
+    elif kind == "objective":
+        problem.maximize("cost", value(phase.final(x)))
+    else:
+        problem.constraint("fuel", value(phase.final(x)), upper=1)
+    return problem
+
+
+@pytest.mark.parametrize("kind", ["initial", "final", "integral", "peak", "path", "objective", "constraint"])
+@pytest.mark.parametrize("value", [lambda x: x * NAN, lambda x: x + INF, lambda x: ca.sqrt(-1 - x), lambda x: 1 / ca.fmin(x, 0)])
+def test_expressions_that_are_nowhere_numbers_are_found_before_any_work(kind, value):
+    name = {"path": "load", "objective": "cost", "constraint": "fuel"}.get(kind, f"{kind}(")
+    refused(broken(kind, value).compile, name)
+
+
+@pytest.mark.parametrize(
+    "rate", [lambda f, x: 1 / (f.tf - f.time), lambda f, x: 1 / f.time, lambda f, x: ca.sqrt(x - 0.9), lambda f, x: 1 / x]
+)
+def test_rates_that_are_numbers_somewhere_are_welcome(rate):
+    problem, phase = bare()
+    x = phase.state("height", bounds=(0, 1), initial=0)
+    phase.dynamics(height=rate(phase, x))
+    problem.minimize("time", phase.final(x))
+    problem.compile()
+
+
+def test_an_objective_that_depends_on_nothing_may_only_be_the_only_one():
+    problem, phase = bare()
+    x = phase.state("height", bounds=(0, 1))
+    phase.dynamics(height=np.float64(1))
+    problem.minimize("nothing", 0 * x + 3)
+    problem.compile()
+    problem.minimize("time", phase.final(x))
+    refused(problem.compile, "nothing", "constant")

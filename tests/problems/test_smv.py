@@ -12,9 +12,6 @@ from statements import refused
 from vectors import cross
 
 from problems import load
-from problems.cases.skip_entry import smv
-from transcription import stated
-from transcription.trajectories.simulate import simulate
 
 STATES = [
     "altitude", "longitude", "latitude", "speed", "flight-path angle", "heading", "mass", "angle of attack", "bank angle", "thrust",
@@ -187,44 +184,6 @@ def test_the_nominal_flight_flies():
     assert (np.abs(found.y - guessed).max(axis=1) < 2e-3 * spans).all()
     assert abs(found.y[0, -1] - 50e3) < 300 and abs(math.degrees(found.y[4, -1])) < 0.1
     assert np.max([np.array(in_the_air(y)[3]) / [200, 13406.4583, 2.5] for y in found.y.T]) < 1.0
-
-
-@pytest.mark.slow
-def test_pictures_show_commands_and_limits(tmp_path):
-    nlp = stated(load("smv").default_transcription).transcribe(load("smv"))
-    Z = nlp.propagate(nlp.first_guess(nlp.guess[None]))
-
-    class Flight:
-        def __init__(self, trajectory):
-            self.trajectory = trajectory
-
-    flights = [Flight(nlp.unpack(z)) for z in np.vstack([Z, Z])]
-    pictures = smv.plot(flights)
-    assert set(pictures) == {"population", "ground-track"}
-    panels = {ax.get_title(loc="left"): ax for ax in pictures["population"].axes}
-    altitude = [line.get_ydata() for line in panels["altitude [km]"].lines]
-    assert altitude[0][0] == pytest.approx(79.248) and altitude[1][-1] == pytest.approx(79.248, abs=1.0)
-    assert len(panels["thrust [MN]"].lines) == 2 * len(altitude), "commands beside what follows them"
-    assert panels["dynamic pressure [kPa]"].lines[-1].get_ydata()[0] == pytest.approx(13.4064583)
-    for name, picture in pictures.items():
-        picture.savefig(tmp_path / f"{name}.png")
-    with pytest.raises(ValueError, match="no flight"):
-        smv.plot([Flight(None)])
-
-
-@pytest.mark.slow
-def test_a_solve_from_the_nominal_flight_is_confirmed():
-    """The greatest terminal speed is its bound; flown by code of its own, the flight ends at 79.248 km within 20 m and keeps its limits."""
-    from macs import optimize
-
-    problem = load("smv")
-    point = optimize(problem, stated(problem.default_transcription), objective="terminal speed", starts=1, verify=None)
-    assert point.status == "converged" and point.objectives["terminal speed"] == pytest.approx(7802.88, abs=1e-3)
-    found = flown(point.trajectory)
-    assert abs(found["descent"][0] - 50e3) < 20 and abs(found["ascent"][0] - 79248.0) < 20
-    assert found["limits"].max() < 1.005
-    again = simulate(problem.compile(), point.trajectory, rtol=1e-10, atol=1e-10)
-    np.testing.assert_allclose(again.trajectory["ascent"].edge_states[-1], found["ascent"], rtol=1e-5, atol=1e-4)
 
 
 def reversals(phase) -> np.ndarray:

@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from vector_problems import parabolas
 
 from problems import CompiledVectorProblem, VectorProblem, is_catalogued, load
-from problems.cases import four_bar_truss
+from problems.cases.structures import four_bar_truss_reference
 
 
 def rows(compiled: CompiledVectorProblem, count: int = 500) -> np.ndarray:
@@ -168,7 +168,7 @@ def _slack(compiled: CompiledVectorProblem, x: np.ndarray) -> np.ndarray:
 def test_the_front_of_the_truss_is_that_of_weighted_sums_found_by_gradients():
     """The problem is convex but for the third area, which both objectives want small: weighted sums give every point of its front."""
     compiled = load("four_bar_truss").compile()
-    J, box = four_bar_truss.reference(4001), [(v.lower, v.upper) for v in compiled.variables]
+    J, box = four_bar_truss_reference(4001), [(v.lower, v.upper) for v in compiled.variables]
     for weight in (1e4, 3e4, 1e5):
         found = minimize(lambda x, w=weight: compiled.evaluate(x[None])[0][0] @ [1.0, w], [2.0] * 4, bounds=box, tol=1e-13)
         assert (J @ [1.0, weight]).min() == pytest.approx(found.fun, rel=1e-7)

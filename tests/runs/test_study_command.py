@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from problems.cases.reentry import case1
-from problems.cases.reentry.vehicle import MASS
+from problems.cases.reentry.cases import case1_reference
+from problems.cases.reentry.statement import MASS
 from runs import Study
 from runs.batch import file as studyfile
 from runs.batch.display import StudyDisplay
@@ -192,7 +192,7 @@ def test_studies_of_the_parameters_of_the_reentry(capsys):
         assert {(cell.solver, cell.evaluations) for cell in study.cells} == {("NSGA-III", 60_000)} | beside
         assert Study.load(f"reentry-{name}").quick().cells[0].evaluations <= 500
     assert [cell.transcription for cell in studies["nodes"].cells] == [f"shooting:{nodes}" for nodes in (100, 150, 200, 250)]
-    loads = case1.reference()[:, 1]
+    loads = case1_reference()[:, 1]
     for name in ("nodes", "discretisations"):
         goal = studies[name].goal
         assert goal["objective"] == "heat load" and [goal["best"], goal["worst"]] == pytest.approx([loads.min(), loads.max()], abs=1e-3)

@@ -20,8 +20,8 @@ from macs.io.atomic import write_whole
 from macs.pareto.dominance import nondominated
 from problems import load
 from problems.cases.aerocapture import coupled
+from problems.cases.aerocapture.capsule import VOLUME
 from problems.cases.aerocapture.designs import BOUNDS, LENGTH, LIFT_TO_DRAG, judged
-from problems.cases.aerocapture.shape import VOLUME
 
 SEEDS = (1, 2, 3)
 STARTS = 3

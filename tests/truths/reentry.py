@@ -30,8 +30,8 @@ from macs.io.console import Steps
 from macs.pareto.directions import across, simplex_lattice
 from macs.pareto.dominance import nondominated
 from problems import load
-from problems.cases.reentry import case1, case2, statement
-from problems.cases.reentry.case3 import ZONES
+from problems.cases.reentry import statement
+from problems.cases.reentry.cases import NARROW, WIDE, ZONES
 from problems.cases.reentry.statement import Limits
 from problems.cases.winged import FOOT
 from transcription import DFET
@@ -39,7 +39,7 @@ from transcription.nlp.scalarized import Solved
 from transcription.trajectories.simulate import simulate
 from transcription.trajectories.trajectory import Trajectory
 
-CASES = {"reentry_case1": (case1.LIMITS, ()), "reentry_case2": (case2.LIMITS, ()), "reentry_case3": (case1.LIMITS, ZONES)}
+CASES = {"reentry_case1": (WIDE, ()), "reentry_case2": (NARROW, ()), "reentry_case3": (WIDE, ZONES)}
 EASIEST = "reentry_case1"
 METHOD = DFET(60, 2, control_order=1, basis="bernstein")
 CORNER = np.array([-28.5, 150.0, 1.5, 200.0])
@@ -267,7 +267,9 @@ def main() -> None:
         rows = made(given.case, given.points)
     except Unsolved as error:
         raise SystemExit(f"{given.case}: {error}; no table was written") from error
-    write_whole(given.out or Path(case1.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode())
+    write_whole(
+        given.out or Path(statement.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode()
+    )
     volume = moocore.hypervolume(np.ascontiguousarray(rows[:, :4] * SIGNS), ref=CORNER)
     print(f"{given.case}: {len(rows)} points, hypervolume {volume:.1f} in the paper's units, from the paper's corner")
     for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):

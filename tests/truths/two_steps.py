@@ -17,8 +17,7 @@ from macs import Point, optimize
 from macs.decisions import Ranges, ReferencePoint, decide
 from problems import load
 from problems.cases.aerocapture.coupled import PACKING, SHIELD
-from problems.cases.aerocapture.designs import judged
-from problems.cases.aerocapture.printed import TABLE_2
+from problems.cases.aerocapture.designs import TABLE_2, judged
 from transcription import stated
 
 DELTA_V = "delta v"

@@ -13,23 +13,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from math import exp, pi, radians, sin
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
 
 from ... import checks
 from ...problem import Problem
+from ..flight_figures import Population, track, trajectories
 from ..winged import STATES, UNITS, Winged
-from .aerodynamics import MASS, lift_and_drag
-from .designs import Designs, judged, shapes_of
-from .dispersions import Capsule, Dispersions, Outcome, outcomes
-from .figures import plot, track
-from .heating import allowed_load, heating_rate, shield_fraction
-from .mars import EXIT_SPEED, MARS, circularisation
-from .orbits import apoapsis, arrival, since_arrival
+from .capsule import MASS, lift_and_drag
+from .designs import TABLE_2, JudgedCapsules, judged, shapes_of
+from .dispersions import Capsule, DispersedOutcome, Dispersions, outcomes
+from .mars import EXIT_SPEED, MARS, allowed_load, apoapsis, arrival, circularisation, heating_rate, shield_fraction, since_arrival
 from .passage import PASSAGE, profile
-from .printed import TABLE_2
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Dispersions", "dispersed", "plot", "problem", "track"]
 
@@ -168,7 +168,7 @@ def flight(
     return ends, phase.final(heat)
 
 
-def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, Outcome]]:
+def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, DispersedOutcome]]:
     """What becomes of each point of a front under dispersions, with its bank profile over time, whose last value stays, and with a constant
     bank solved anew for each case."""
     design = _design(front.source.data.get("shape", SHAPE))
@@ -213,7 +213,7 @@ def _capsule(design: np.ndarray) -> tuple[float, float, float]:
     return area * float(lift[0]), area * float(drag[0]), float(shapes.nose[0])
 
 
-def guess(problem: Problem, design: Designs, nose: float, most: float, declination: float) -> None:
+def guess(problem: Problem, design: JudgedCapsules, nose: float, most: float, declination: float) -> None:
     """Set the guess of the phase of `flight`: the passage at constant bank of the first of `design`.
 
     Its heading turns with the speed that is lost, dpsi/dx = L/D sin(bank) / 2, so that it ends polar.
@@ -235,3 +235,26 @@ def guess(problem: Problem, design: Designs, nose: float, most: float, declinati
         **{"flight-path angle": (time, planar.path_angle), "bank angle": bank, "bank rate": 0.0},
         **{"heat load": (time, np.clip(1e-3 * planar.heat / nose**0.5, 0.0, most))},
     )
+
+
+ALONG = (*STATES, "bank angle", "bank rate", "heat load")
+SHOWN_UNITS = {
+    "altitude": ("km", 1e-3),
+    "speed": ("km/s", 1e-3),
+    "heat load": ("kJ/cm2", 1.0),
+    "bank rate": ("deg/s", float(np.degrees(1.0))),
+}
+
+
+def plot(flights: Sequence[Any]) -> dict[str, Figure]:
+    """Both figures by name, states and bank over time, as figures 14 to 17 of the paper, and the ground track, coloured by delta v.
+
+    Parameters
+    ----------
+    flights : Front, Points, Simulations
+        Whatever has a `trajectory`. Of Simulations, the simulated trajectory is drawn; of Points, that of the transcription.
+    """
+    phases = [list(trajectory.values()) for trajectory in trajectories(flights)]
+    speeds = np.array([float(flight[-1].at(flight[-1].tf)["speed"]) for flight in phases])
+    flown = Population(phases, circularisation(speeds), "delta v [m/s]")
+    return {"population": flown.over_time(ALONG, SHOWN_UNITS), "ground-track": flown.on_the_map()[0]}

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...vector import VectorProblem
 from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, judged, shapes_of
-from .dispersions import Capsule, Dispersions, Outcome, outcomes
+from .dispersions import Capsule, DispersedOutcome, Dispersions, outcomes
 from .mars import ARRIVAL_SPEED, EXIT_SPEED, exit_speeds
 from .passage import PASSAGE, Passage
 
@@ -91,7 +91,7 @@ def _passage(arrival_speed: float = ARRIVAL_SPEED, exit_speed: float = EXIT_SPEE
     return replace(PASSAGE, arrival_speed=arrival_speed, exit_speed=exit_speed)
 
 
-def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, Outcome]]:
+def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, DispersedOutcome]]:
     """What becomes of each point of a front under dispersions, with its constant bank and with one solved anew for each case."""
     X, passage = np.array([np.asarray(row) for row in front.decision]), _passage(**front.source.data)
     found, (shapes, _) = judged(X, passage), shapes_of(X)

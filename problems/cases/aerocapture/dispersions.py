@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from ... import checks
-from .heating import heating_rate, shield_fraction
-from .mars import MARS, Mars
+from .mars import MARS, Mars, heating_rate, shield_fraction
 from .passage import PASSAGE
 
 FLOOR, FARTHEST = 10e3, 10_000e3
@@ -177,7 +176,7 @@ class Exits:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class DispersedOutcome:
     """What becomes of cases: arrays (k,).
 
     Attributes
@@ -227,19 +226,19 @@ class Outcome:
         return found
 
 
-def outcomes(capsules: Sequence[Capsule], dispersions: Dispersions) -> list[dict[str, Outcome]]:
+def outcomes(capsules: Sequence[Capsule], dispersions: Dispersions) -> list[dict[str, DispersedOutcome]]:
     """Of each capsule the nominal case alone, and all cases in both ways: `as_it_is` and `solved_anew`."""
     cases = dispersions.draw()
     ways = {"nominal": (as_it_is, NOMINAL), "bank as it is": (as_it_is, cases), "bank solved anew": (solved_anew, cases)}
     return [{name: way(capsule, some) for name, (way, some) in ways.items()} for capsule in capsules]
 
 
-def as_it_is(capsule: Capsule, cases: Cases) -> Outcome:
+def as_it_is(capsule: Capsule, cases: Cases) -> DispersedOutcome:
     """The cases with the bank angle of the nominal one, or its profile over time."""
     return _judged(capsule, flown(capsule, cases, capsule.upward))
 
 
-def solved_anew(capsule: Capsule, cases: Cases) -> Outcome:
+def solved_anew(capsule: Capsule, cases: Cases) -> DispersedOutcome:
     """The cases, each with the constant bank angle that brings its apoapsis to the target orbit.
 
     More lift upward leaves the air earlier and faster, with a higher apoapsis. A case in which all the lift is not enough is flown with all
@@ -269,7 +268,7 @@ def two_burns(speed: np.ndarray, path_angle: np.ndarray, mars: Mars = MARS) -> n
     return np.asarray(first + np.abs(np.sqrt(2.0 * mars.mu * apoapsis / (goal * between)) - np.sqrt(mars.mu / goal)))
 
 
-def _judged(capsule: Capsule, exits: Exits, upward: np.ndarray | None = None) -> Outcome:
+def _judged(capsule: Capsule, exits: Exits, upward: np.ndarray | None = None) -> DispersedOutcome:
     inverse = exits.inverse_apoapsis()
     goal = MARS.target_radius
     # False for NaN, too.
@@ -280,7 +279,7 @@ def _judged(capsule: Capsule, exits: Exits, upward: np.ndarray | None = None) ->
     columns[:, captured] = error / 1e3, two_burns(speed, path), shield_fraction(heat / capsule.nose**0.5), lowest / 1e3
     miss, delta_v, shield, least = columns
     on_target = None if upward is None else np.abs(miss) <= 1e-3 * ON_TARGET
-    return Outcome(captured, np.isnan(inverse), on_target, miss, delta_v, shield, least, upward)
+    return DispersedOutcome(captured, np.isnan(inverse), on_target, miss, delta_v, shield, least, upward)
 
 
 def _constant(upward: np.ndarray) -> Lift:

@@ -1,18 +1,30 @@
-"""Mars with an exponential atmosphere, the hyperbola on which a capsule arrives and the ellipse on which it leaves the air.
+"""Mars with an exponential atmosphere: the hyperbola of a capsule that arrives, its heating in the air, the ellipse on which it leaves.
 
-Armellin and Lavagna, "Multidisciplinary Optimization of Aerocapture Maneuvers", Journal of Artificial Evolution and Applications 2008.
-The paper prints the interface, the target orbit and the speeds. The gravitational parameter is that of Mars (Konopliv et al., "Mars high
+Armellin and Lavagna, "Multidisciplinary Optimization of Aerocapture Maneuvers", Journal of Artificial Evolution and Applications 2008. The
+paper prints the interface, the target orbit and the speeds. The gravitational parameter is that of Mars (Konopliv et al., "Mars high
 resolution gravity fields from MRO, Mars seasonal gravity, and other dynamical parameters", Icarus 211, 2011: 4.28284e13, here to five
 digits). Radius, scale height and density are not printed: they are fitted to numbers of the paper, so that agreement with its tables tests
-the model, not these three values.
+the model, not these three values. Orbits: Battin, "An Introduction to the Mathematics and Methods of Astrodynamics", AIAA 1999, chapters 3
+and 4.
+
+Convective heating at the stagnation point, and the heat shield that a heat load asks for: eqs. (3) and (4), after Tauber and Bowles, "The
+use of atmospheric braking during Mars missions", AIAA 89-1730, and Laub and Venkatapathy, "Thermal protection system technology and
+facility needs for demanding future planetary missions", 2003. Two readings: eq. (3) prints 0.0091, which gives a fraction ten times
+smaller than all tables: here 0.091, in per cent for J/cm2. The wall enthalpy is not printed: a constant, fitted to the heat shields of
+Tables 1 and 2.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import cos, radians, sin
 from typing import Any
 
+import casadi as ca
 import numpy as np
+
+from ..winged import STATES
 
 
 @dataclass(frozen=True)
@@ -117,3 +129,90 @@ def capture_by_burn(arrival_speed: float = ARRIVAL_SPEED, mars: Mars = MARS) -> 
 def propellant_fraction(delta_v: float, impulse: float = 400.0, gravity: float = 9.81) -> float:
     """Propellant over initial mass for a delta v in m/s and a specific impulse in s: eq. (24)."""
     return float(-np.expm1(-delta_v / (impulse * gravity)))
+
+
+def arrival(begins: Mapping[str, Any], declination: float, mars: Mars) -> dict[str, Any]:
+    """What vanishes if the capsule comes from the right direction: components of its velocity far away across that, by name.
+
+    The velocity far away is along e / |e|^2 + sqrt(1 - 1 / |e|^2) q, with the eccentricity vector e towards the periapsis, and q a right
+    angle ahead of it.
+
+    Parameters
+    ----------
+    begins : mapping
+        States at the entry by the names of `winged.STATES`.
+    declination : float
+        Of the velocity far away, deg; it points to the longitude 0.
+    mars : Mars
+    """
+    h, lon, lat, v, path, heading = (begins[name] for name in STATES)
+    up = ca.vertcat(ca.cos(lat) * ca.cos(lon), ca.cos(lat) * ca.sin(lon), ca.sin(lat))
+    east = ca.vertcat(-ca.sin(lon), ca.cos(lon), 0.0)
+    north = ca.vertcat(-ca.sin(lat) * ca.cos(lon), -ca.sin(lat) * ca.sin(lon), ca.cos(lat))
+    velocity = v * (ca.sin(path) * up + ca.cos(path) * (ca.sin(heading) * east + ca.cos(heading) * north))
+    momentum = ca.cross((mars.radius + h) * up, velocity)
+    e = ca.cross(velocity, momentum) / mars.mu - up
+    size = ca.sumsqr(e)
+    ahead = ca.cross(momentum, e) / ca.sqrt(ca.sumsqr(momentum) * size)
+    asymptote = e / size + ca.sqrt(1.0 - 1.0 / size) * ahead
+    return {
+        "arrival sideways": asymptote[1],
+        "arrival upward": asymptote[2] * cos(radians(declination)) - asymptote[0] * sin(radians(declination)),
+    }
+
+
+def apoapsis(ends: Mapping[str, Any], mars: Mars) -> Any:
+    """Altitude of the apoapsis of the orbit after the exit, m: eq. (26) of Armellin and Lavagna (see `mars`)."""
+    r, path = mars.radius + ends["altitude"], ends["flight-path angle"]
+    return r / (2.0 - _excess(r, ends["speed"], mars)) * (1.0 + eccentricity(r, ends["speed"], path, mars)) - mars.radius
+
+
+def eccentricity(r: Any, speed: Any, path: Any, mars: Mars) -> Any:
+    """Of the orbit through a point at a radius, m, with a speed, m/s, and a path angle, rad."""
+    return ca.sqrt((_excess(r, speed, mars) - 1.0) ** 2 * ca.cos(path) ** 2 + ca.sin(path) ** 2)
+
+
+def since_arrival(r: float, speed: float, path: float, mars: Mars) -> float:
+    """Angle, rad, that a hyperbola has turned about the planet since it was far away."""
+    excess = _excess(r, speed, mars)
+    anomaly = ca.atan2(excess * cos(path) * sin(path), excess * cos(path) ** 2 - 1.0)
+    return float(ca.acos(-1.0 / eccentricity(r, speed, path, mars)) + anomaly)
+
+
+def _excess(r: Any, speed: Any, mars: Mars) -> Any:
+    """Squared speed over that of the circle."""
+    return r * speed**2 / mars.mu
+
+
+CONSTANT = 1.35e-8
+"""Of the heating rate in W/cm2, for SI units."""
+SPEED_POWER = 3.04
+WALL_ENTHALPY = 1.395e6
+"""J/kg; fitted."""
+SHIELD, SHIELD_POWER = 0.091, 0.51575
+"""Per cent of the mass for a heat load in J/cm2, and its power."""
+
+
+def heating_rate(density: Any, speed: Any, nose: Any = 1.0, wall_enthalpy: float = WALL_ENTHALPY) -> Any:
+    """Convective heating rate at the stagnation point, W/cm2: eq. (4), with the total enthalpy v^2/2.
+
+    Parameters
+    ----------
+    density, speed : numbers, arrays or expressions
+        Of the air, kg/m3, and of the flight, m/s.
+    nose : the same
+        Nose radius, m. That of 1 m gives the rate times the root of the nose radius, which no longer depends on the nose.
+    wall_enthalpy : float
+        J/kg.
+    """
+    return CONSTANT * (density / nose) ** 0.5 * speed**SPEED_POWER * (1.0 - 2.0 * wall_enthalpy / speed**2)
+
+
+def shield_fraction(load: Any) -> Any:
+    """Mass of the heat shield in per cent of the capsule's, for a heat load in J/cm2: eq. (3) with 0.091."""
+    return SHIELD * load**SHIELD_POWER
+
+
+def allowed_load(fraction: Any) -> Any:
+    """Heat load in J/cm2 that a heat shield of so many per cent of the capsule's mass bears: eq. (3) solved for it."""
+    return (fraction / SHIELD) ** (1.0 / SHIELD_POWER)

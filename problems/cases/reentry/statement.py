@@ -7,6 +7,10 @@ longitude once, which is a slip; the heat load is in kBtu/ft2, the only unit in 
 integral of the rate of the flight-path angle, which would be a mere difference between its ends, is that of its absolute value.
 
 The absolute value and the peak are exact in the search; gradient tools bound them from above, which is the same where they are minimised.
+
+The shuttle, with figures in feet, slugs and Btu (all that is computed is SI but for the heating rate): Betts, "Practical Methods for
+Optimal Control and Estimation Using Nonlinear Programming", SIAM 2010, section 6.1; eqs. (5) and (9) of the paper, in which the sign of
+the density's exponent is a slip.
 """
 
 from __future__ import annotations
@@ -21,11 +25,30 @@ import casadi as ca
 import numpy as np
 
 from ... import checks
+from ...compiled import vector_function
 from ...phase import Phase
 from ...problem import Problem
-from ..winged import FOOT, GRAVITIES, UNITS
-from .nominal import ATTACK, BANK, guess
-from .vehicle import MASS, PRESSURE, SHUTTLE
+from ..winged import FOOT, GRAVITIES, POUND, SLUG, UNITS, Winged
+
+MASS = 6309.43 * SLUG
+PRESSURE = POUND / FOOT**2
+"""One lbf/ft2 in Pa."""
+SHUTTLE = Winged(
+    radius=20902900.0 * FOOT,
+    mu=0.14076539e17 * FOOT**3,
+    density=0.002378 * SLUG / FOOT**3,
+    scale_height=23800.0 * FOOT,
+    area=2690.0 * FOOT**2,
+    lift=(-0.20704, 1.67556),
+    drag=(0.07854, -0.352896, 2.039962),
+    heating=(1.0672181, -0.019213774, 2.1286289e-4, -1.0117249e-6),
+    # To Btu/ft2/s.
+    heating_constant=17700.0 * 1e-4**3.07 * (FOOT**3 / SLUG) ** 0.5 / FOOT**3.07,
+)
+ATTACK = np.radians([17.4, 17.4])
+"""rad, at equal steps of time: the glide of the greatest range."""
+BANK = np.radians([-75.0, -45.0, -2.0])
+"""rad, likewise: sharply to the left at first, where there is speed to lose, then less and less."""
 
 START = {
     "altitude": 260000 * FOOT,
@@ -37,11 +60,7 @@ START = {
     "angle of attack": radians(17.4),
     "bank angle": radians(-75.0),
 }
-
-
 END = {"altitude": 80000 * FOOT, "speed": 2500 * FOOT, "flight-path angle": radians(-5.0)}
-
-
 BOUNDS = {
     "altitude": (20e3, 120e3),
     "longitude": (-pi, pi),
@@ -52,12 +71,8 @@ BOUNDS = {
     "angle of attack": (0.0, radians(40.0)),
     "bank angle": (radians(-90.0), radians(1.0)),
 }
-
-
 SCALES = {state: abs(value) for state, value in END.items()}
 """What counts as one: for all that is limited its limit, so that a violation of 0.01 is 1 % of it."""
-
-
 ANGLES = ("angle of attack", "bank angle")
 
 
@@ -185,8 +200,55 @@ def declare(phase: Phase, start: Mapping[str, float], end: Mapping[str, Any]) ->
     }
 
 
-REFERENCE = "the front that gradients found"
-"""Name of the reference in reports: every row is a local solve within narrower limits, so that there may be better flights."""
+def guess(
+    phase: Phase, start: Mapping[str, float], until: float, laws: Mapping[str, Sequence[float] | np.ndarray], begin: float = 0.0
+) -> dict[str, float]:
+    """Make a nominal flight, and the laws that it follows, the guess of a phase, whose dynamics are given: a law, and where it leads.
+
+    Parameters
+    ----------
+    phase : Phase
+    start : {state: value}
+        At least of those of the phase.
+    until, begin : float
+        Times at which the flight ends and begins, s.
+    laws : {control: values}
+        Of all controls, at equal steps of time, linear between.
+
+    Returns
+    -------
+    dict
+        The states at the end, as they stand in the guess.
+    """
+    times = np.linspace(begin, until, 401)
+    controls = {name: np.interp(times, np.linspace(begin, until, len(law)), law) for name, law in laws.items()}
+    states = _propagated(phase, [start[name] for name in phase._rates], controls, times)
+    end = {}
+    for name, values in zip(phase._rates, states, strict=True):
+        # With other data it may lead anywhere: then it is a poor guess, but one.
+        lower, upper = phase._states[name].lower, phase._states[name].upper
+        inside = np.clip(np.where(np.isfinite(values), values, lower), lower, upper)
+        phase.guess(**{name: (times, inside)})
+        end[name] = float(inside[-1])
+    for name, law in controls.items():
+        phase.guess(**{name: (times, law)})
+    return end
+
+
+def _propagated(phase: Phase, start: Sequence[float], laws: Mapping[str, np.ndarray], times: np.ndarray) -> np.ndarray:
+    """States (nx, n) at equidistant times (n,), by the classical Runge-Kutta method."""
+    groups = {"x": [phase[name] for name in phase._rates], "u": [phase[name] for name in laws]}
+    rate = vector_function("rate", groups, list(phase._rates.values()))
+    h, x = float(times[1] - times[0]), ca.MX.sym("x", len(phase._rates))
+    left, right = ca.MX.sym("left", len(laws)), ca.MX.sym("right", len(laws))
+    k1 = rate(x, left)
+    k2 = rate(x + 0.5 * h * k1, 0.5 * (left + right))
+    k3 = rate(x + 0.5 * h * k2, 0.5 * (left + right))
+    k4 = rate(x + h * k3, right)
+    step = ca.Function("step", [x, left, right], [x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+    law = np.array(list(laws.values()))
+    flight = np.array(step.mapaccum(len(times) - 1)(start, law[:, :-1], law[:, 1:]))
+    return np.column_stack([start, flight])
 
 
 def known(case: str) -> np.ndarray:

@@ -1,10 +1,10 @@
 """A skip to 51.88 km and back: terminal mass against terminal speed.
 
-Bae, Shin, Savvaris and Tsourdos, "Multi-objective skip trajectory optimization for hypersonic reentry vehicles", Cranfield University. What
-the paper leaves open is chosen here: the specific impulse, 319 s, is such that the printed 86502 kg and 4970 m/s lie on the front (a
-calibration); the constant of the heating rate is that of Betts (`reentry.vehicle`), which the paper's limit of 200 Btu/ft2/s goes with; the
-speed, "free" in the table of bounds, is at most the initial one, as the printed 7803 m/s says; and the
-flight is level at its lowest point. Thrust follows without lag.
+Bae, Shin, Savvaris and Tsourdos, "Multi-objective skip trajectory optimization for hypersonic reentry vehicles", Cranfield University.
+What the paper leaves open is chosen here: the specific impulse, 319 s, is such that the printed 86502 kg and 4970 m/s lie on the front (a
+calibration); the constant of the heating rate is that of Betts (`reentry.statement`), which the paper's limit of 200 Btu/ft2/s goes with;
+the speed, "free" in the table of bounds, is at most the initial one, as the printed 7803 m/s says; and the flight is level at its lowest
+point. Thrust follows without lag.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from ...problem import Problem
-from ..reentry.vehicle import SHUTTLE
+from ..flight_figures import track
+from ..reentry.statement import SHUTTLE
 from ..winged import Winged
-from .figures import plot, track
-from .statement import ASCENT, DESCENT, START, TOP, Mission, skip_entry
+from .statement import ASCENT, DESCENT, START, TOP, Mission, plot, skip_entry
 
-__all__ = ["REFERENCE", "plot", "problem", "reference", "track"]
+__all__ = ["plot", "problem", "reference", "track"]
 
-REFERENCE = "the front that gradients found"
+reference_name = "the front that gradients found"
 HEATING = 200.0
 """Btu/ft2/s: the paper's 2269.7864 kW/m2, with the thermochemical Btu."""
 LOWEST, IMPULSE = 51880.0, 319.0

@@ -24,15 +24,14 @@ from typing import Any
 import numpy as np
 
 from ...problem import Problem
-from ..reentry.nominal import guess
-from ..reentry.vehicle import SHUTTLE
+from ..flight_figures import track
+from ..reentry.statement import SHUTTLE, guess
 from ..winged import FOOT, SLUG, Winged
-from .figures import plot, track
-from .statement import ASCENT, COMMANDED, DESCENT, START, Mission, skip_entry
+from .statement import ASCENT, COMMANDED, DESCENT, START, Mission, plot, skip_entry
 
-__all__ = ["REFERENCE", "plot", "problem", "reference", "track"]
+__all__ = ["plot", "problem", "reference", "track"]
 
-REFERENCE = "the front that gradients found"
+reference_name = "the front that gradients found"
 
 HEATING = 200.0
 """Btu/ft2/s."""

@@ -6,16 +6,22 @@ bound, which implies it, and a coarse mesh would dip below without.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, pi, radians
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
+import numpy as np
 
 from ... import checks
 from ...phase import Phase
 from ...problem import Problem
-from ..winged import UNITS, Winged
+from ..flight_figures import Population, trajectories
+from ..winged import STATES, UNITS, Winged
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DESCENT, ASCENT = "descent", "ascent"
 TOP = 79248.0
@@ -47,6 +53,16 @@ PRESSURE, LOAD = 13406.4583, 2.5
 """Limits of the dynamic pressure, Pa, and of the load, in weights."""
 DURATIONS = {DESCENT: (20.0, 3000.0), ASCENT: (20.0, 1500.0)}
 """Usual bounds, s; no flight of interest takes so little or so much."""
+ALONG = (*STATES, "mass", *COMMANDED)
+SHOWN_UNITS = {
+    "altitude": ("km", 1e-3),
+    "speed": ("km/s", 1e-3),
+    "mass": ("t", 1e-3),
+    "thrust": ("MN", 1e-6),
+    "heating rate": ("Btu/ft2/s", 1.0),
+    "dynamic pressure": ("kPa", 1e-3),
+    "load factor": ("g", 1.0),
+}
 
 
 @dataclass(frozen=True)
@@ -142,3 +158,16 @@ def _fly(phase: Phase, mission: Mission, begins: Mapping[str, float], ends: Mapp
     phase.path("dynamic pressure", vehicle.dynamic_pressure(altitude, speed), upper=PRESSURE, unit="Pa", scale=PRESSURE)
     phase.path("load factor", vehicle.load_factor(altitude, speed, attack, mass), upper=LOAD, unit="g", scale=LOAD)
     return heating
+
+
+def plot(flights: Sequence[Any]) -> dict[str, Figure]:
+    """States, controls with their commands and what the air does over time, and the ground track; coloured by flight time.
+
+    Parameters
+    ----------
+    flights : Front, Points, Simulations
+        Whatever has a `trajectory`. Of Simulations, the simulated trajectory is drawn; of Points, that of the transcription.
+    """
+    phases = [list(trajectory.values()) for trajectory in trajectories(flights)]
+    flown = Population(phases, np.array([flight[-1].tf for flight in phases]), "flight time [s]")
+    return {"population": flown.over_time(ALONG, SHOWN_UNITS), "ground-track": flown.on_the_map()[0]}

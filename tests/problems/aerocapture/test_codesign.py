@@ -14,12 +14,10 @@ from vectors import cross, norm
 
 from macs import MACS, optimize
 from problems import load
-from problems.cases.aerocapture.aerodynamics import lift_and_drag
-from problems.cases.aerocapture.codesign.corridor import BALLISTIC, LIFT_TO_DRAG, boundary, width
-from problems.cases.aerocapture.designs import BOUNDS, judged, shapes_of
+from problems.cases.aerocapture.capsule import lift_and_drag, sized
+from problems.cases.aerocapture.codesign import BALLISTIC, RATIO, boundary, corridor_width
+from problems.cases.aerocapture.designs import BOUNDS, TABLE_2, judged, shapes_of
 from problems.cases.aerocapture.passage import passages
-from problems.cases.aerocapture.printed import TABLE_2
-from problems.cases.aerocapture.shape import sized
 from transcription import stated
 
 MU, RADIUS, HEIGHT, DENSITY, MASS = 4.2828e13, 3390.7e3, 8.92e3, 3.17e-7, 946.0
@@ -53,21 +51,6 @@ def test_expressions_have_the_values_of_arrays_and_true_derivatives():
         differences = np.array((function((row + steps).T) - function((row - steps).T)) / 2e-6)
         np.testing.assert_allclose(np.array(slopes(row)), differences, atol=2e-7, err_msg=str(i))
         assert np.isfinite(np.array(curves(row))).all()
-
-
-def test_the_slope_of_lift_at_no_angle_of_attack():
-    """Of a sharp cone, from the closed form of Clark and Trimmer (see `test_newtonian_flow`): C_pmax (cos^2 t - sin^2 t)."""
-    t, attack = np.radians(50.0), ca.MX.sym("attack")
-    lift, _ = lift_and_drag(sized(ca.MX(1e-9), 0.5, t, 0.3), attack, greatest=2.0)
-    slope = ca.Function("slope", [attack], [ca.jacobian(lift, attack)])
-    assert float(slope(0.0)) == pytest.approx(2.0 * np.cos(2.0 * t), rel=1e-9)
-
-
-def test_the_mirror_image_has_the_other_sign_of_lift():
-    shapes, attack = shapes_of(np.array([printed.design for printed in TABLE_2.values()]))
-    lift, drag = lift_and_drag(shapes, attack)
-    mirrored, same = lift_and_drag(shapes, -attack)
-    np.testing.assert_allclose([mirrored, same], [-lift, drag], rtol=1e-12)
 
 
 def exit_apoapsis(entry_angle: float, ballistic: float, lift: float) -> float:
@@ -107,8 +90,8 @@ def test_corridors_against_flights_from_the_entry(ballistic, lift):
 
     steepest, shallowest = edge(lift), edge(-lift)
     np.testing.assert_allclose(boundary(np.full(2, ballistic), np.array([lift, -lift])), [steepest, shallowest], atol=5e-6)
-    assert width(ballistic, lift) == pytest.approx(np.degrees(shallowest - steepest), abs=2e-3)
-    assert float(ca.evalf(width(ca.MX(ballistic), lift))) == pytest.approx(width(ballistic, lift), rel=1e-12)
+    assert corridor_width(ballistic, lift) == pytest.approx(np.degrees(shallowest - steepest), abs=2e-3)
+    assert float(ca.evalf(corridor_width(ca.MX(ballistic), lift))) == pytest.approx(corridor_width(ballistic, lift), rel=1e-12)
 
 
 def test_the_passage_is_the_boundary_for_its_own_lift():
@@ -119,16 +102,16 @@ def test_the_passage_is_the_boundary_for_its_own_lift():
 @pytest.mark.slow
 def test_corridors_all_over_the_range():
     rng = np.random.default_rng(8)
-    ballistic, lift = np.exp(rng.uniform(*np.log(BALLISTIC), 40)), rng.uniform(*LIFT_TO_DRAG, 40)
+    ballistic, lift = np.exp(rng.uniform(*np.log(BALLISTIC), 40)), rng.uniform(*RATIO, 40)
     angles = np.degrees(boundary(np.tile(ballistic, 2), np.concatenate([-lift, lift])))
-    np.testing.assert_allclose(width(ballistic, lift), angles[:40] - angles[40:], atol=2e-3)
+    np.testing.assert_allclose(corridor_width(ballistic, lift), angles[:40] - angles[40:], atol=2e-3)
 
 
 def test_capsules_are_within_the_range_of_the_corridor():
     found = judged(np.random.default_rng(9).uniform(*np.array(BOUNDS).T, (20_000, 5)))
     good = (np.abs(found.lift_to_drag) >= 0.3) & (found.length >= 0.8)
     assert found.ballistic[good].min() > BALLISTIC[0] and found.ballistic[good].max() < BALLISTIC[1]
-    assert np.abs(found.lift_to_drag[good]).max() < LIFT_TO_DRAG[1]
+    assert np.abs(found.lift_to_drag[good]).max() < RATIO[1]
 
 
 def confirm(point) -> None:
@@ -199,15 +182,6 @@ def test_single_optima_flown_again(objective):
     confirm(point)
     start = judged(np.array([TABLE_2[2].design]))
     assert point.objectives[objective] < float((start.packing if objective == "inverse packing efficiency" else start.shield)[0])
-
-
-@pytest.mark.slow
-def test_slender_shapes_are_mirror_images():
-    problem = load("aerocapture_codesign", shape=1)
-    point = optimize(problem, stated(problem.default_transcription), objective="inverse packing efficiency", starts=1)
-    assert point.verified and point.parameters["angle of attack"] > 0.0
-    assert point.objectives["inverse packing efficiency"] < TABLE_2[1].packing
-    confirm(point)
 
 
 @pytest.mark.parametrize(

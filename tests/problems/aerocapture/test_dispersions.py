@@ -15,11 +15,10 @@ from vectors import cross, norm
 
 from macs import payoff
 from problems import load
-from problems.cases.aerocapture import bank, dispersions
-from problems.cases.aerocapture.designs import judged, shapes_of
+from problems.cases.aerocapture import bank
+from problems.cases.aerocapture.designs import TABLE_2, judged, shapes_of
 from problems.cases.aerocapture.dispersions import NOMINAL, Capsule, Cases, Dispersions, as_it_is, flown, solved_anew, two_burns
 from problems.cases.aerocapture.mars import MARS, circularisation, exit_angle
-from problems.cases.aerocapture.printed import TABLE_2
 from transcription import stated
 
 MU, RADIUS, HEIGHT, DENSITY = 4.2828e13, 3390.7e3, 8.92e3, 3.17e-7
@@ -213,36 +212,6 @@ def test_not_enough_lift_is_flown_with_all_of_it():
     assert found.lost.tolist() == [True, False, False, False]
 
 
-def test_small_dispersions_are_linear():
-    """The apoapsis of each case against slopes by central differences of other code."""
-    design = capsule(4)
-    small = Dispersions(entry_angle=1e-6, density=1e-7, ballistic=1e-7, cases=50, seed=3)
-    cases = small.draw()
-
-    def far(angle: float, density: float, ballistic: float) -> float:
-        case = Cases(np.array([angle]), np.array([1 + density]), np.array([1 + ballistic]))
-        return apoapsis(over_a_plain(design, upward_of(design), case, 0)[0])
-
-    slopes = [(far(*(e * 1e-6)) - far(*(-e * 1e-6))) / 2e-6 for e in np.eye(3)]
-    expected = np.column_stack([cases.entry_angle, cases.density - 1, cases.ballistic - 1]) @ slopes
-    nominal = as_it_is(design, NOMINAL).apoapsis_error[0]
-    np.testing.assert_allclose(as_it_is(design, cases).apoapsis_error - nominal, expected, rtol=0.02, atol=3e-4)
-    assert np.abs(expected).max() > 0.02
-
-
-@pytest.mark.slow
-def test_shorter_steps_converge(monkeypatch):
-    design, cases = capsule(2), Dispersions(cases=100, seed=1).draw()
-    found = []
-    for tolerance in (1e-12, 1e-8, 1e-6):
-        monkeypatch.setattr(dispersions, "TOLERANCE", tolerance)
-        found.append(flown(design, cases, design.upward).inverse_apoapsis())
-    out = np.isfinite(found[0])
-    errors = [np.abs(one - found[0])[out].max() for one in found[1:]]
-    assert 30 < out.sum() < 70
-    assert errors[0] < 1e-6 and errors[0] < 0.1 * errors[1]
-
-
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.7, 1.4), st.floats(-0.2, 0.2), st.sampled_from(sorted(TABLE_2)))
@@ -254,14 +223,6 @@ def test_density_and_ballistic_coefficient_together_change_only_the_heat(factor,
     np.testing.assert_allclose(exits.speed[1], exits.speed[0], rtol=1e-7)
     np.testing.assert_allclose(exits.lowest[1], exits.lowest[0], rtol=1e-7)
     np.testing.assert_allclose(exits.heat[1], np.sqrt(factor) * exits.heat[0], rtol=1e-7)
-
-
-@pytest.mark.parametrize("number", TABLE_2)
-def test_heavier_thinner_and_steeper_go_deeper(number):
-    design = capsule(number)
-    steeper, thicker, heavier = np.array([0, -2e-3, 0, 0]), np.array([1, 1, 1.1, 1]), np.array([1, 1, 1, 1.1])
-    lowest = flown(design, Cases(steeper, thicker, heavier), lambda rows, _: np.full(len(rows), 0.2)).lowest
-    assert lowest[1] < lowest[0] and lowest[3] < lowest[0] < lowest[2]
 
 
 def test_two_burns():

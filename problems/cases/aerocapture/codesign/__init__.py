@@ -1,1 +1,0 @@
-"""Aerocapture with shape and bank profile at once."""
