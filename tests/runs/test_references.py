@@ -102,7 +102,7 @@ def test_closed_forms():
     assert closed_form("betts_heating").tolist() == [[30.6255]]
     with pytest.raises(ValueError, match=r"'landing_site' with landers = 2"):
         closed_form("landing_site", {"landers": 2})
-    with pytest.raises(ValueError, match=r"no true front of 'problems\.sanity:"):
+    with pytest.raises(ValueError, match=r"no true front of 'problems\.sampling:"):
         closed_form("problems.sampling:problem")
 
 
