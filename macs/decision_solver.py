@@ -13,10 +13,9 @@ from problems.problem import Problem
 from transcription.base import Transcription
 
 from .decisions.choice import Choice
-from .decisions.decide import check_statement
-from .decisions.desk import Desk
-from .decisions.satisfy import satisfied
-from .decisions.stages import SAME
+from .decisions.decide import check_statement, raise_lambda
+from .decisions.solver import DecisionSolver
+from .decisions.stages import SAME_VALUE
 from .front import Front
 from .fronts.points import Points
 from .fronts.provenance import more_costs, versions
@@ -98,17 +97,17 @@ class Decide(GradientSolver):
                 return before.take([]).replace(message="time limit before the first choice")
         asked = Terms(known, self.starts, terms["seed"], terms["tolerance"], terms["verify"], MOST_ITERATIONS, limit, terms["progress"])
         ranges = None if self.ranges is None else _ranges(self.ranges)
-        desk = Desk(problem, transcription, ranges, asked, mends=self.mesh == "mended")
-        found = desk.work(lambda: _choices(desk, preferences))
-        stats = {"versions": versions(), **desk.stats()}
+        solver = DecisionSolver(problem, transcription, ranges, asked, resolves=self.mesh == "mended")
+        found = solver.run(lambda: _choices(solver, preferences))
+        stats = {"versions": versions(), **solver.stats()}
         if before is not None:
-            stats = more_costs(before.stats, desk.solves.counts, stats["wall_time"], stats.get("stopped", ""))
+            stats = more_costs(before.stats, solver.solves.counts, stats["wall_time"], stats.get("stopped", ""))
         if terms["verify"] is not None:
             stats["verify"] = terms["verify"]
         points = Points.concatenate([choice.point.alone() for _, choice in found])
         about = [_about(label, choice) for label, choice in found]
         return Front.of(
-            points.replace(solver=self.about(), stats={**stats, "ranges": _data(desk.ranges), "choices": about}, message=_message(found))
+            points.replace(solver=self.about(), stats={**stats, "ranges": _data(solver.ranges), "choices": about}, message=_message(found))
         )
 
     def remeshed(self, front: Front, time_limit: float | None, progress: bool | None) -> Front:
@@ -116,28 +115,28 @@ class Decide(GradientSolver):
         return front
 
 
-def _choices(desk: Desk, preferences: list[tuple[str, Preference, bool]]) -> list[tuple[str, Choice]]:
+def _choices(solver: DecisionSolver, preferences: list[tuple[str, Preference, bool]]) -> list[tuple[str, Choice]]:
     """The choices by label, those that were made until the work was to end."""
     found: list[tuple[str, Choice]] = []
     for label, preference, loop in preferences:
-        if desk.stopped and found:
+        if solver.stopped and found:
             return found
-        found.append((label, _chosen(desk, preference, loop)))
+        found.append((label, _chosen(solver, preference, loop)))
     # Later choices may have found better points for earlier ones, of which solves are local.
     for k, (label, preference, loop) in enumerate(preferences):
-        if desk.stopped:
+        if solver.stopped:
             break
-        best = preference.rank(desk.known, desk.ranges)
-        if not loop and best.values[best.order[0]] < found[k][1].value - SAME * max(abs(found[k][1].value), 1.0):
-            found[k] = (label, _chosen(desk, preference, loop))
+        best = preference.rank(solver.known, solver.ranges)
+        if not loop and best.values[best.order[0]] < found[k][1].value - SAME_VALUE * max(abs(found[k][1].value), 1.0):
+            found[k] = (label, _chosen(solver, preference, loop))
     return found
 
 
-def _chosen(desk: Desk, preference: Preference, loop: bool) -> Choice:
+def _chosen(solver: DecisionSolver, preference: Preference, loop: bool) -> Choice:
     """A choice, of which the point is known from now on."""
-    desk.history = []
-    choice = satisfied(desk, preference) if loop and isinstance(preference, FuzzySatisfactory) else desk.decided(preference)
-    desk.known = Points.concatenate([desk.known, choice.point.alone()])
+    solver.history = []
+    choice = raise_lambda(solver, preference) if loop and isinstance(preference, FuzzySatisfactory) else solver.choose(preference)
+    solver.known = Points.concatenate([solver.known, choice.point.alone()])
     return choice
 
 

@@ -21,13 +21,10 @@ from ..preferences import (
     from_dict,
     to_dict,
 )
-from .choice import Choice, Step
-from .decide import decide
+from .choice import Choice, Step, Turn
+from .decide import decide, satisfy
 from .dialogue import Dialogue
-from .front_rates import front_rates, plot_rates
-from .satisfy import satisfy
-from .trade_offs import TradeOffs, trade_offs
-from .turn import Turn
+from .trade_offs import TradeOffs, front_rates, plot_rates, trade_offs
 
 __all__ = [
     "Around",

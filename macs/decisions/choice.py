@@ -1,4 +1,4 @@
-"""Choice: the point that was chosen, how well it satisfies each objective, and the steps that led to it."""
+"""Choice: the point that was chosen, how well it satisfies each objective, and the steps that led to it; a turn of a dialogue."""
 
 from __future__ import annotations
 
@@ -172,6 +172,42 @@ class Choice:
         ]
         said = [f"{step.name}: {step.message}" for step in self.history if step.message]
         return [text_table([titles, units], rows, [True, True, *[False] * (len(titles) - 2)]), *said] if rows else []
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """One turn of a dialogue.
+
+    Attributes
+    ----------
+    asked : str
+        What the person asked for, in words.
+    preference : Preference
+        What it means.
+    choice : Choice or None
+        What was chosen by it; None: nothing yet.
+    alternatives : tuple of Choice
+        Others about it.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import Dialogue, ReferencePoint
+    >>> dialogue = Dialogue(front)  # without the problem, points are ranked
+    >>> choice = dialogue.prefer(ReferencePoint({"flight time": 180.0}))
+    >>> choice = dialogue.choose()
+    >>> turn = dialogue.history[-1]
+    >>> turn.choice is None
+    False
+    """
+
+    asked: str
+    preference: Preference
+    choice: Choice | None = None
+    alternatives: tuple[Choice, ...] = ()
 
 
 def degree_text(degree: float) -> str:

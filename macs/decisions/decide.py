@@ -1,8 +1,12 @@
-"""decide: the point of a problem that suits a preference best, by gradients."""
+"""decide: the point of a problem that suits a preference best, by gradients; satisfy: goals whose order of priority is enforced."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
@@ -14,9 +18,9 @@ from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..gradient_tools import Terms
 from ..gradients.scalarised import MOST_ITERATIONS
-from ..preferences import Preference, Ranges
+from ..preferences import FuzzySatisfactory, Preference, Ranges, Stage
 from .choice import Choice
-from .desk import Desk
+from .solver import DecisionSolver
 
 
 def decide(
@@ -81,14 +85,77 @@ def decide(
     >>> print(choice.point.verified)
     True
     """
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    solver, wanted = _stated(problem, transcription, preference, ranges, terms)
+    return solver.run(lambda: solver.choose(wanted))
+
+
+def satisfy(
+    problem: Problem | CompiledProblem,
+    transcription: Transcription | FuzzySatisfactory | None = None,
+    preference: FuzzySatisfactory | None = None,
+    *,
+    ranges: Ranges | None = None,
+    start: Points | Point | None = None,
+    starts: int | str = "auto",
+    seed: int | None = 0,
+    tolerance: float = 1e-6,
+    verify: float | None = VERIFY,
+    max_iterations: int = MOST_ITERATIONS,
+    time_limit: float | None = None,
+    progress: bool | None = None,
+) -> Choice:
+    """The choice by fuzzy satisfactory goals with the least lambda, of those tried, at which the memberships keep their order of priority.
+
+    With the `regulating` of the preference as lambda, `decide` is called; while kappa > 0, lambda is raised, and the solves begin at the
+    points found before as well (steps 2 to 4 of Bae and others). For m goals, lambda stays below 1/m: from there on, a worse membership of
+    the less important goal would be a gain. If kappa > 0 still, the order becomes a hard limit, kappa <= 0.
+
+    Parameters
+    ----------
+    problem, transcription, ranges, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
+        As for `decide`. It may be called as `satisfy(problem, preference)`, too.
+    preference : FuzzySatisfactory
+        Its `regulating` is the first lambda.
+
+    Returns
+    -------
+    Choice
+        Its `history` has every step with its lambda and kappa; its `preference` is that of the last step. Its `message` says if the order
+        had to be imposed.
+
+    Raises
+    ------
+    ValueError
+        As `decide`; and if the preference is another one.
+
+    Examples
+    --------
+    >>> from macs import sweep
+    >>> from problems import load
+    >>> from transcription import DFET
+    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> from macs.decisions import FuzzySatisfactory, satisfy
+    >>> goals = FuzzySatisfactory({}, priorities=["horizontal speed", "flight time"])
+    >>> choice = satisfy(load("goddard"), DFET(6, 6, basis="bernstein"), goals, start=front, starts=1)
+    >>> choice.degrees["horizontal speed"] > 0
+    True
+    """
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    solver, goals = _stated(problem, transcription, preference, ranges, terms)
+    if not isinstance(goals, FuzzySatisfactory):
+        raise ValueError(f"satisfy takes a FuzzySatisfactory, not {goals!r}; decide takes any preference")
+    return solver.run(lambda: raise_lambda(solver, goals))
+
+
+def _stated(problem: Any, transcription: Any, preference: Any, ranges: Ranges | None, terms: Terms) -> tuple[DecisionSolver, Preference]:
+    """The solver of a statement, and its preference, in whichever place it was given; all checked before any work."""
     if preference is None and isinstance(transcription, Preference):
         transcription, preference = None, transcription
-    check_statement(problem, transcription, preference, start)
-    assert not isinstance(transcription, Preference) and preference is not None
-    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
-    desk = Desk(problem, transcription, ranges, terms)
-    preference.check(desk.problem.goals)
-    return desk.work(lambda: desk.decided(preference))
+    check_statement(problem, transcription, preference, terms.start)
+    solver = DecisionSolver(problem, transcription, ranges, terms)
+    preference.check(solver.problem.goals)
+    return solver, preference
 
 
 def check_statement(problem: Any, transcription: Any, preference: Any, start: Any) -> None:
@@ -104,3 +171,54 @@ def check_statement(problem: Any, transcription: Any, preference: Any, start: An
         raise ValueError(f"preference must be a Preference such as WeightedSum({{'flight time': 1.0}}), not {preference!r}")
     if start is not None and not isinstance(start, Points | Point):
         raise ValueError(f"start must be a Front or a Point, not {type(start).__name__}")
+
+
+def raise_lambda(solver: DecisionSolver, preference: FuzzySatisfactory) -> Choice:
+    """The choice at the least lambda, of those tried, that keeps the order of priority; the order is imposed if none does."""
+    known: list[Point] = []
+    for weight in lambdas(preference.regulating, len(preference.names)):
+        trial = replace(preference, regulating=weight)
+        choice, kappa = _at_lambda(solver, trial, known)
+        if kappa <= 0.0 or preference.ordered or solver.stopped:
+            return choice
+        known.insert(0, choice.point)
+    choice, _ = _at_lambda(solver, replace(trial, ordered=True), known)
+    words = f"the order of priority was not kept up to lambda = {weight:.6g}; it was imposed"
+    return replace(choice, message="; ".join(filter(None, [words, choice.message])))
+
+
+def lambdas(first: float, m: int) -> list[float]:
+    """Values of lambda for m goals: the first and its doubles, and where these would reach 1/m five more, each halving what is left."""
+    weights, most = [first], 1.0 / m
+    if first == 0.0:
+        weights.append(FuzzySatisfactory.regulating)
+    while 2.0 * weights[-1] < most:
+        weights.append(2.0 * weights[-1])
+    for _ in range(5 if weights[-1] < most else 0):
+        weights.append(weights[-1] + 0.5 * (most - weights[-1]))
+    return weights
+
+
+def _at_lambda(solver: DecisionSolver, trial: FuzzySatisfactory, known: Sequence[Point]) -> tuple[Choice, float]:
+    """The choice at one lambda, and its kappa, which its last step has, too."""
+    goals = solver.problem.goals
+    (stage,) = trial.stages(goals, solver.ranges)
+    if trial.ordered and known:
+        stage = _with_margin(stage, trial)
+    choice = solver.choose(trial, {"lambda": trial.regulating}, known, [stage])
+    kappa = float(trial.kappa(goals, solver.ranges, np.array([[*choice.objectives.values()]]))[0])
+    if solver.history:
+        last = solver.history[-1]
+        solver.history[-1] = replace(last, about={**last.about, "kappa": kappa})
+    return replace(choice, history=tuple(solver.history)), kappa
+
+
+def _with_margin(stage: Stage, preference: FuzzySatisfactory) -> Stage:
+    """A stage that keeps the order of priority by a little more than solves may exceed a limit by, 1e-7 in memberships."""
+    pairs = len(preference.pairs)
+
+    def limits(J: Sequence[Any]) -> list[Any]:
+        every = stage.limits(J)
+        return [*every[:-pairs], *(one + 1e-7 for one in every[-pairs:])]
+
+    return replace(stage, limits=limits)

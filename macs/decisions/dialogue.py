@@ -27,11 +27,10 @@ from ..io.text import counted, text_table
 from ..preferences import Preference, Ranges, to_dict
 from ..preferences import from_dict as preference_from_dict
 from ..preferences.ranges import confidence, shown
-from .choice import Choice, degree_text
+from .choice import Choice, Turn, degree_text
 from .decide import decide
 from .dialogue_file import FORMAT, VERSION, ChoiceRecord, DialogueRecord, TurnRecord, finite, packed, read, readable, write
 from .improving import around, improved, neutral
-from .turn import Turn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -296,7 +295,7 @@ class Dialogue:
         ValueError
             If nothing was chosen yet.
         """
-        from .dialogue_plot import draw_history
+        from .figures import draw_history
 
         made = [(turn.asked, turn.choice) for turn in self.history if turn.choice is not None]
         return draw_history(self.goals, self.ranges, [asked for asked, _ in made], [choice for _, choice in made], by, figure)

@@ -1,13 +1,14 @@
-"""Gradient solves of one stage of a preference: on a transcription that is given, and on a mesh that is found."""
+"""Gradient solves of one stage of a preference, on a given transcription or on a mesh that is found; and the hard limits of all stages."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledProblem, Objective
 from problems.valued import ObjectiveBox, Valued, valued
 from transcription import from_dict
 from transcription.base import NLP
@@ -18,6 +19,7 @@ from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import certified, from_vectors
+from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs
 from ..fronts.verified import unmarked
@@ -25,28 +27,25 @@ from ..gradient_tools import MESHES, PART
 from ..gradients.multistart import MultistartSolver
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..preferences import Stage
+from ..preferences.preference import BEYOND, standing
+from ..preferences.ranges import shown
+from ..preferences.stage import LIMIT_TOL, exceeded
 from ..refinement.found_optimum import found_optimum
 from ..refinement.mending import solved_again
 from ..refinement.mesh_loop import MeshLoop, Programs
 
 MINIMUM = Scalarised.single(0, 1)
 """Of a problem with one objective, which is minimised."""
-ROOM = 10.0
-"""By how many times their ranges objectives may leave these, and all values that are known, at first."""
-WIDENED = 3
-"""Most times that this is made ten times as wide for an objective that is at an end of it."""
-FEASIBLE = 1e-2
-"""Largest violation of a vector whose objectives say where others may lie."""
-KEEPS, SAME = 1e-7, 1e-6
-"""What a stage attained may be exceeded by in the stages after it, and by how much values may differ that are as good as each other: these
-parts of its size, and of 1 at least."""
-
+WIDENINGS = 3
+"""Most times that the room of an objective is made ten times as wide because its optimum is at an end of it."""
+SAME_VALUE = 1e-6
+"""By how much values of stages differ that are as good as each other: this part of their size, and of 1 at least."""
 ONLY_NEAR = "it is not the optimum of the preference on its mesh, but near the one that was found on another"
 """Note of a point that was solved again in the objectives themselves."""
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class StartVectors:
     """Vectors to begin at, of the problem itself on one transcription: Z (k, n), best first, and their objectives F (k, m), minimised."""
 
     nlp: NLP
@@ -55,7 +54,7 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False)
-class Lifted:
+class EpigraphSolution:
     """The optimum of a stage in the derived problem: a vector z of its NLP; `first`: no stages before it are kept."""
 
     stage: Stage
@@ -66,7 +65,7 @@ class Lifted:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class StageSolution:
     """A stage solved: the vector z of the NLP of the problem itself, its objectives F (m,), minimised, and what is to be said of it; and
     the same in the derived problem in which it was found."""
 
@@ -75,25 +74,16 @@ class Outcome:
     F: np.ndarray
     status: str
     note: str = ""
-    lifted: Lifted | None = None
+    epigraph: EpigraphSolution | None = None
 
     @property
-    def known(self) -> Known:
+    def known(self) -> StartVectors:
         """Itself as a vector to begin at."""
-        return Known(self.nlp, self.z[None], self.F[None])
+        return StartVectors(self.nlp, self.z[None], self.F[None])
 
 
-@dataclass(frozen=True, eq=False)
-class Kept:
-    """A stage and what it attained, which those after it keep."""
-
-    stage: Stage
-    value: float
-
-    @property
-    def most(self) -> float:
-        """The largest value that it may have."""
-        return self.value + KEEPS * max(abs(self.value), 1.0)
+StageBound = tuple[Stage, float]
+"""A stage and the value that it attained, which those after it keep."""
 
 
 class StageSolver:
@@ -104,28 +94,29 @@ class StageSolver:
     ) -> None:
         self.problem, self.solves, self.rng = problem, solves, rng
         self._box = ObjectiveBox(best, worst, np.minimum(best, worst), np.maximum(best, worst))
-        self._room = np.full(len(best), ROOM)
+        # By how many times their ranges objectives may leave these, and all values that are known.
+        self._room = np.full(len(best), 10.0)
 
-    def on_mesh(self, stage: Stage, kept: Sequence[Kept], known: Known, starts: int) -> Outcome:
+    def on_mesh(self, stage: Stage, kept: Sequence[StageBound], known: StartVectors, starts: int) -> StageSolution:
         """The best result of so many starts on the transcription of the known vectors; the first are these, others are random."""
-        for widened in range(WIDENED + 1):
+        for widened in range(WIDENINGS + 1):
             derived = self._derived(stage, kept, known)
             nlp = known.nlp.transcription.transcribe(derived.problem)
             solved = self._multistart(derived, nlp, known, starts)
-            outcome = self._outcome(stage, not kept, derived, nlp, known.nlp, solved.z, solved.status, solved.message)
-            if widened == WIDENED or solved.status != CONVERGED or not self._widened(derived, nlp, solved.z):
+            solution = self._solution(stage, not kept, derived, nlp, known.nlp, solved.z, solved.status, solved.message)
+            if widened == WIDENINGS or solved.status != CONVERGED or not self._widened(derived, nlp, solved.z):
                 break
-            known = outcome.known
-        return outcome
+            known = solution.known
+        return solution
 
     def on_found_mesh(
-        self, stage: Stage, meshes: Sequence[Meshed], known_on: Callable[[Meshed], Known], starts: int, verify: float
-    ) -> Outcome:
+        self, stage: Stage, meshes: Sequence[Meshed], known_on: Callable[[Meshed], StartVectors], starts: int, verify: float
+    ) -> StageSolution:
         """The optimum on a mesh that is found for it, from the first of these `meshes` on, where all starts are solved; the next is tried
         where that leads nowhere. `known_on` has the vectors to begin at on each."""
         limits = PART * verify
         wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
-        for widened in range(WIDENED + 1):
+        for widened in range(WIDENINGS + 1):
             known = known_on(meshes[0])
             derived = self._derived(stage, (), known)
             loop = MeshLoop(Programs(derived.problem), self.solves, wanted, MESHES, WORK.most)
@@ -140,38 +131,38 @@ class StageSolver:
 
             found = found_optimum(loop, MINIMUM, given, 1, self.rng, meshes)
             own = found.nlp.transcription.transcribe(self.problem)
-            outcome = self._outcome(stage, True, derived, found.nlp, own, found.z, found.status, found.note)
-            if widened == WIDENED or found.status != CONVERGED or not self._widened(derived, found.nlp, found.z):
+            solution = self._solution(stage, True, derived, found.nlp, own, found.z, found.status, found.note)
+            if widened == WIDENINGS or found.status != CONVERGED or not self._widened(derived, found.nlp, found.z):
                 break
-        return outcome
+        return solution
 
-    def again(self, outcome: Outcome, verify: float) -> Outcome:
-        """The outcome solved again for the value of its stage, within hard limits, where a simulation of the derived problem does not
+    def again(self, solution: StageSolution, verify: float) -> StageSolution:
+        """A solution, solved again for the value of its stage, within hard limits, where a simulation of the derived problem does not
         confirm it: on finer meshes, or inside the limits that it exceeds; itself where that leads nowhere."""
-        before = outcome.lifted
+        before = solution.epigraph
         if before is None or not before.first:
             # What stages before attained on this mesh is not what they attain on others.
-            return outcome
-        found = self._mended(before.nlp, before.z, outcome.note, verify)
+            return solution
+        found = self._resolved(before.nlp, before.z, solution.note, verify)
         z, method = found[0].decision, from_dict(found[0].transcription or {})
         if method == before.nlp.transcription and np.array_equal(z, before.z):
-            return outcome
+            return solution
         nlp, own = method.nlp(before.derived.problem), method.nlp(self.problem)
-        return self._outcome(before.stage, before.first, before.derived, nlp, own, z, CONVERGED, unmarked(found)[0].note)
+        return self._solution(before.stage, before.first, before.derived, nlp, own, z, CONVERGED, unmarked(found)[0].note)
 
-    def nearest(self, outcome: Outcome, verify: float, known: Points) -> Outcome:
-        """The outcome solved again in the objectives themselves, from where it is on, where a simulation does not confirm it; itself where
+    def nearest(self, solution: StageSolution, verify: float, known: Points) -> StageSolution:
+        """A solution, solved again in the objectives themselves, from where it is on, where a simulation does not confirm it; itself where
         that leads nowhere. Objectives are judged by the ranges of known points."""
-        found = self._mended(outcome.nlp, outcome.z, outcome.note, verify, _confirmed_ends(known).replace(problem=self.problem))
+        found = self._resolved(solution.nlp, solution.z, solution.note, verify, _confirmed_ends(known).replace(problem=self.problem))
         z, method = found[0].decision, from_dict(found[0].transcription or {})
-        if method == outcome.nlp.transcription and np.array_equal(z, outcome.z):
-            return outcome
+        if method == solution.nlp.transcription and np.array_equal(z, solution.z):
+            return solution
         note = "; ".join(filter(None, [ONLY_NEAR, unmarked(found)[0].note]))
-        return Outcome(method.nlp(self.problem), z, found.F[0], CONVERGED, note)
+        return StageSolution(method.nlp(self.problem), z, found.F[0], CONVERGED, note)
 
-    def _mended(self, nlp: NLP, z: np.ndarray, note: str, verify: float, among: Points | None = None) -> Points:
-        """A converged vector as a point that is mended as those of other gradient tools are, beside others of a front, which are confirmed;
-        what that costs is counted."""
+    def _resolved(self, nlp: NLP, z: np.ndarray, note: str, verify: float, among: Points | None = None) -> Points:
+        """A converged vector as a point, solved again as those of other gradient tools are if a simulation does not confirm it, beside
+        confirmed points of a front; what that costs is counted."""
         about = costs(Counts(), wall_time=0.0, seed=None, tolerance=self.solves.tolerance, reproducible=True)
         point = from_vectors(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
         found = solved_again(point if among is None else unmarked(Points.concatenate([point, among])), verify)
@@ -179,17 +170,19 @@ class StageSolver:
         self.solves.counts = self.solves.counts.joined(Counts(**spent, clocked=int(not found.stats["reproducible"])))
         return found[[0]]
 
-    def _derived(self, stage: Stage, kept: Sequence[Kept], known: Known) -> Valued:
+    def _derived(self, stage: Stage, kept: Sequence[StageBound], known: StartVectors) -> Valued:
         """The problem with the value of the stage as its objective."""
-        feasible = np.isfinite(known.F).all(axis=1) & (known.nlp.evaluate(known.Z)[1] <= FEASIBLE)
+        # Vectors that are nearly feasible say where objectives may lie.
+        feasible = np.isfinite(known.F).all(axis=1) & (known.nlp.evaluate(known.Z)[1] <= 1e-2)
         J = known.F[feasible] * self.problem.signs
         ends = np.vstack([self._box.best, self._box.worst, J])
         room = self._room * self._box.scales
         box = replace(self._box, lower=ends.min(axis=0) - room, upper=ends.max(axis=0) + room)
         # Without its limits: a start may exceed them.
-        values = replace(stage, limits=_none).numbers(J)
+        values = replace(stage, limits=_nothing).numbers(J)
         values = values[np.isfinite(values)]
-        limits = [(one.stage, one.most) for one in kept]
+        # The part of its size, and of 1 at least, by which later stages may exceed what a stage attained.
+        limits = [(one, value + 1e-7 * max(abs(value), 1.0)) for one, value in kept]
         return valued(self.problem, stage, box, kept=limits, zero=float(values[0]) if len(values) else 0.0)
 
     def _widened(self, derived: Valued, nlp: NLP, z: np.ndarray) -> bool:
@@ -198,7 +191,7 @@ class StageSolver:
         self._room = np.where([goal.name in ends for goal in self.problem.goals], 10.0 * self._room, self._room)
         return bool(ends)
 
-    def _multistart(self, derived: Valued, nlp: NLP, known: Known, starts: int) -> Solved:
+    def _multistart(self, derived: Valued, nlp: NLP, known: StartVectors, starts: int) -> Solved:
         """The best of so many solves: from known vectors, then from random ones."""
         Z = derived.lifted(known.nlp.variables, nlp.variables, known.Z, known.F)
         solver = MultistartSolver(nlp, Z, 1, self.rng, self.solves)
@@ -212,10 +205,12 @@ class StageSolver:
                 break
         return solver.better(found, MINIMUM)
 
-    def _outcome(self, stage: Stage, first: bool, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str) -> Outcome:
+    def _solution(
+        self, stage: Stage, first: bool, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str
+    ) -> StageSolution:
         """What was found, as a vector of the problem itself."""
         own_z = own.tighten(derived.dropped(nlp.variables, own.variables, z)[None])
-        return Outcome(own, own_z[0], own.evaluate(own_z)[0][0], status, note, Lifted(stage, first, derived, nlp, z))
+        return StageSolution(own, own_z[0], own.evaluate(own_z)[0][0], status, note, EpigraphSolution(stage, first, derived, nlp, z))
 
 
 def _confirmed_ends(known: Points) -> Points:
@@ -225,5 +220,46 @@ def _confirmed_ends(known: Points) -> Points:
     return known[sorted({int(rows[k]) for k in [*F.argmin(axis=0), *F.argmax(axis=0)]} if len(rows) else [])]
 
 
-def _none(J: Sequence[object]) -> list[object]:
+def with_all_limits(stages: Sequence[Stage], m: int) -> list[Stage]:
+    """The stages of m objectives, of which the first has all limits: the later ones keep it, and so have them, too. Those of one name are
+    one limit; without names, each is one of its own."""
+    places: dict[str | tuple[int, int], tuple[int, int, str]] = {}
+    for i, stage in enumerate(stages):
+        for k, name in enumerate(stage.titles(len(stage.limits([1.0] * m)))):
+            places.setdefault(name if stage.limit_names else (i, k), (i, k, name))
+
+    def every(J: Sequence[Any]) -> list[Any]:
+        found = [stage.limits(J) for stage in stages]
+        return [found[i][k] for i, k, _ in places.values()]
+
+    bare = [replace(stage, limits=_nothing, limit_names=()) for stage in stages]
+    return [replace(bare[0], limits=every, limit_names=tuple(name for _, _, name in places.values())), *bare[1:]]
+
+
+def excess_stage(limits: Stage) -> Stage:
+    """The stage of which the value is the largest excess over the limits of another."""
+    return Stage("largest excess over hard limits", lambda J, peaks: peaks[0], lambda J: [limits.limits(J)])
+
+
+def within_limits(limits: Stage, point: Point) -> bool:
+    """Whether a point is within the limits of a stage."""
+    return bool(limits.excess(np.array([[*point.objectives.values()]]))[0] <= LIMIT_TOL)
+
+
+def keeps_limits(limits: Stage, point: Point, verify: float) -> bool:
+    """Whether a feasible point is within the limits of a stage, as far as `standing` tells."""
+    return bool(standing([limits], point.alone(), verify)[0] < BEYOND)
+
+
+def conflict_message(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
+    """Text with the limits that cannot be met, by objectives (m,) that exceed them as little as possible: those in conflict are exceeded
+    alike there, by half of the largest excess at least."""
+    excess = limits.excesses(J[None])[0]
+    names = [limits.titles(len(excess))[k] for k in np.flatnonzero(excess >= 0.5 * excess.max())]
+    nearest = ", ".join(f"{goal.name} {shown(float(value), goal)}" for goal, value in zip(goals, J, strict=True))
+    what = f"all of: {', '.join(names)}" if len(names) > 1 else names[0]
+    return f"no point was found that meets {what}; the nearest has {nearest}: {exceeded(limits, goals, J)}"
+
+
+def _nothing(J: Sequence[Any]) -> list[Any]:
     return []

@@ -398,13 +398,14 @@ class FuzzySatisfactory(Preference):
         spans.ends(goals)
         return aims({name: self.targets.get(name, spans.best[name]) for name in self.names}, goals, spans, to_worst=True)
 
-    def _pairs(self) -> list[tuple[str, str]]:
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
         """All goals s of one level and r of the next."""
         return [(s, r) for more, less in pairwise(levels(self.priorities)) for s in more for r in less]
 
     def _excesses_of_order(self, found: Mapping[str, Aim], J: Sequence[Operand]) -> list[Operand]:
         """d_s - d_r of all goals s of one level and r of the next."""
-        return [found[s].deviation(J) - found[r].deviation(J) for s, r in self._pairs()]
+        return [found[s].deviation(J) - found[r].deviation(J) for s, r in self.pairs]
 
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
         found = self._aims(goals, ranges)
@@ -415,13 +416,13 @@ class FuzzySatisfactory(Preference):
 
         def groups(J: Sequence[Operand]) -> list[list[Operand]]:
             # The largest of these is kappa. Without a kink in what rises: a solve would not end at an optimum that lies there.
-            order = [part - found[r].deviation(J) for s, r in self._pairs() for part in found[s].parts(J)]
+            order = [part - found[r].deviation(J) for s, r in self.pairs for part in found[s].parts(J)]
             return [order, *([0.0, *aim.excesses(J)] for aim in found.values())]
 
         def limits(J: Sequence[Operand]) -> list[Operand]:
             return [*tolerances(J), *(self._excesses_of_order(found, J) if self.ordered else ())]
 
-        order = [f"{s} satisfied at least as {r}" for s, r in self._pairs()] if self.ordered else []
+        order = [f"{s} satisfied at least as {r}" for s, r in self.pairs] if self.ordered else []
         return (Stage("1 - membership, order", value, groups, limits, (*limit_names, *order)),)
 
     def kappa(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 from choices import plain_front
 
 from macs.decisions import Stage
-from macs.decisions.judging import excess_stage, keeps, meets, unmet, with_all_limits
+from macs.decisions.stages import conflict_message, excess_stage, keeps_limits, with_all_limits, within_limits
 from macs.preferences.stage import LIMIT_TOL
 from problems.compiled import Objective
 
@@ -56,7 +56,7 @@ def test_limits_without_names_are_all_kept_also_where_stages_have_one_name() -> 
     """They were taken for one limit, and the second was lost."""
     found = with_all_limits([limited("level", (0, 3.0, ""), unnamed=True), limited("level", (1, 5.0, ""), unnamed=True)], 2)[0]
     assert found.excesses(np.array([[0.0, 7.0]])).tolist() == [[-3.0, 2.0]]
-    assert not meets(found, at(0.0, 7.0))
+    assert not within_limits(found, at(0.0, 7.0))
 
 
 def test_the_stage_of_the_excess_is_the_largest_and_is_called_so_in_a_history() -> None:
@@ -72,8 +72,8 @@ def test_the_stage_of_the_excess_is_the_largest_and_is_called_so_in_a_history() 
 def test_rounding_does_not_count_as_beyond_a_limit(share: float, within: bool) -> None:
     """What is met has a value, what is not has none: both are told by the same slack, exactly."""
     stage, point = limited("cheap", (0, 0.0, "time at most 0")), at(share * LIMIT_TOL, 1.0)
-    assert meets(stage, point) is within
-    assert keeps(stage, point, 1e-3) is within
+    assert within_limits(stage, point) is within
+    assert keeps_limits(stage, point, 1e-3) is within
     assert np.isfinite(stage.numbers(np.array([[*point.objectives.values()]]))[0]) == within
 
 
@@ -82,8 +82,8 @@ def test_what_was_simulated_keeps_a_limit_as_far_as_simulations_may_miss_it() ->
     stage = limited("cheap", (0, 3.0, "time at most 3"))
     flown = {"defect": [0.5], "simulated_violation": [0.0], "simulated_F": [[3.05, 1.0]], "verified": [False]}
     point = at(2.0, 1.0, **flown)
-    assert point.verified is False and meets(stage, point)
-    assert keeps(stage, point, 0.1) and not keeps(stage, point, 0.01)
+    assert point.verified is False and within_limits(stage, point)
+    assert keeps_limits(stage, point, 0.1) and not keeps_limits(stage, point, 0.01)
 
 
 # What is said
@@ -92,21 +92,21 @@ def test_what_was_simulated_keeps_a_limit_as_far_as_simulations_may_miss_it() ->
 def test_only_limits_in_conflict_are_named_and_what_the_nearest_misses() -> None:
     """Limits are in conflict that are exceeded at least half as much as the one that is exceeded most."""
     stage = limited("cheap", (0, 3.0, "time at most 3 s"), (1, 5.0, "mass at most 5"), (1, 5.5, "mass at most 5.5"))
-    assert unmet(stage, (TIME, MASS), np.array([4.0, 7.0])) == (
+    assert conflict_message(stage, (TIME, MASS), np.array([4.0, 7.0])) == (
         "no point was found that meets all of: time at most 3 s, mass at most 5, mass at most 5.5; the nearest has time 4 s, mass 7:"
         " 'time at most 3 s' is missed by 1 s, 'mass at most 5' is missed by 2, 'mass at most 5.5' is missed by 1.5"
     )
-    words = unmet(stage, (TIME, MASS), np.array([3.99, 7.0]))
+    words = conflict_message(stage, (TIME, MASS), np.array([3.99, 7.0]))
     assert "meets all of: mass at most 5, mass at most 5.5;" in words and "'time at most 3 s' is missed by 0.99 s" in words
 
 
 @pytest.mark.parametrize(("J", "name"), [((9.0, 0.0), "short"), ((0.0, 9.0), "light")])
 def test_a_single_limit_is_named_alone(J: tuple[float, float], name: str) -> None:
-    words = unmet(limited("cheap", (0, 3.0, "short"), (1, 5.0, "light")), (TIME, MASS), np.array(J))
+    words = conflict_message(limited("cheap", (0, 3.0, "short"), (1, 5.0, "light")), (TIME, MASS), np.array(J))
     assert words.startswith(f"no point was found that meets {name}; the nearest has time {J[0]:g} s, mass {J[1]:g}: '{name}' is missed by")
     assert "all of" not in words
 
 
 def test_limits_without_names_are_said_by_their_numbers() -> None:
-    words = unmet(limited("cheap", (0, 3.0, ""), (1, 5.0, ""), unnamed=True), (TIME, MASS), np.array([1.0, 9.0]))
+    words = conflict_message(limited("cheap", (0, 3.0, ""), (1, 5.0, ""), unnamed=True), (TIME, MASS), np.array([1.0, 9.0]))
     assert words.startswith("no point was found that meets limit 2 of cheap;") and words.endswith("'limit 2 of cheap' is missed by 4")

@@ -1,10 +1,11 @@
-"""Figures of trade-offs: what one choice costs, and the rates along a front. They need no display."""
+"""Figures of decisions: the rates along a front, what one choice costs, and the turns of a dialogue. They need no display."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,15 +14,12 @@ from problems.compiled import Objective
 from ..fronts.pictures.style import COLORS, GREY, STYLE, axis_label, better, new_figure, title_and_legend
 from ..fronts.points import Points
 from ..io.text import label
+from ..preferences import Preference, Ranges
+from ..preferences.pictures import draw_degrees
+from .choice import Choice
 
-DASH = 0.05
-"""Length of a dash that shows a slope, in widths of its axes."""
-WIDE = 30.0
-"""Ratio of the largest and the smallest rate from which on they are drawn on a logarithmic axis."""
-BEYOND = 3.0
-"""Multiple of the largest slope of a chord up to which slopes at points are drawn."""
-STEPS = 0.1
-"""How much better an objective gets, in ranges of the front, where a figure shows what that costs."""
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def draw_rates(front: Points, rates: np.ndarray, figure: Any = None) -> Sequence[Any]:
@@ -53,9 +51,9 @@ def _two(front: Points, rates: np.ndarray, figure: Any) -> Sequence[Any]:
     every = np.concatenate([chords, sizes])
     usual = every[np.isfinite(every) & (every > 0)]
     if len(usual):
-        wide = usual.max() > WIDE * usual.min()
+        wide = usual.max() > 30.0 * usual.min()
         # At the ends of a front slopes have no limit.
-        low, high = np.array([usual.min(), usual.max() if len(chords) < 2 else min(usual.max(), BEYOND * np.nanmax(chords))])
+        low, high = np.array([usual.min(), usual.max() if len(chords) < 2 else min(usual.max(), 3.0 * np.nanmax(chords))])
         sizes = np.clip(sizes, low, high)
         if wide:
             below.set_yscale("log")
@@ -97,7 +95,8 @@ def _dashes(ax: Any, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> None:
     shape = ax.bbox.height / ax.bbox.width
     tilt = np.arctan2(slopes * width / height * shape, 1.0)
     tilt = np.where(np.isinf(slopes), 0.5 * np.pi, tilt)
-    dx, dy = DASH * width * np.cos(tilt), DASH * height * np.sin(tilt) / shape
+    dash = 0.05  # its length in widths of the axes
+    dx, dy = dash * width * np.cos(tilt), dash * height * np.sin(tilt) / shape
     ax.plot(np.array([x - dx, x + dx]), np.array([y - dy, y + dy]), color=COLORS[1], lw=1.0, solid_capstyle="round", zorder=2)
     known = ~np.isnan(slopes)
     ax.scatter(x[known], y[known], s=11, color=COLORS[0], linewidths=0.0, zorder=3)
@@ -109,7 +108,7 @@ def draw_trade_offs(goals: Sequence[Objective], ranges: np.ndarray, tables: Mapp
     each that gets better, darker where the change is more of a range; see `TradeOffs.plot`. goals, ranges (m,)."""
     import matplotlib
 
-    steps = np.array([_round(STEPS * size) if size > 0 else 1.0 for size in ranges])
+    steps = np.array([_round(0.1 * size) if size > 0 else 1.0 for size in ranges])
     with matplotlib.rc_context(STYLE | {"axes.grid": False}):  # type: ignore[arg-type]
         m = len(goals)
         figure = _sized(figure, 1.2 + len(tables) * (1.05 * m + 0.2) + 0.8, 0.55 * m + 1.5)
@@ -156,3 +155,60 @@ def _sized(figure: Any, width: float, height: float) -> Any:
         return new_figure(width, height)
     figure.set_size_inches(width, height)
     return figure
+
+
+def draw_history(
+    goals: Sequence[Objective],
+    ranges: Ranges,
+    asked: Sequence[str],
+    choices: Sequence[Choice],
+    by: Preference | None = None,
+    figure: Any = None,
+) -> Sequence[Axes]:
+    """Axes with the degrees of choices, a group of bars for each, and one for each objective with its values."""
+    import matplotlib
+
+    if not choices:
+        raise ValueError("nothing was chosen yet: there is no history to draw")
+    J = np.array([[*one.objectives.values()] for one in choices])
+    kinds = [one.preference for one in choices]
+    if by is None and len({one.SMALLER for one in kinds}) > 1:
+        by = kinds[0]
+    if by is not None:
+        kinds = [by]
+    degrees = np.array([[one.degrees[goal.name] for goal in goals] for one in choices]) if by is None else by.degrees(goals, ranges, J)
+    heights = kinds[0].DEGREE if len({one.DEGREE for one in kinds}) == 1 else "degree (1: all that was asked for)"
+    marks = kinds[0].MARKS if len({one.MARKS for one in kinds}) == 1 else ()
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        left = max(3.6, 0.9 + len(choices) * max(1.25, 0.36 * len(goals)))
+        figure = new_figure(1.0, 1.0) if figure is None else figure
+        figure.set_size_inches(left + 3.4, max(3.6, 1.3 * len(goals) + 0.8))
+        grid = figure.add_gridspec(len(goals), 2, width_ratios=(left, 3.0))
+        bars = figure.add_subplot(grid[:, 0])
+        groups = ["\n".join(textwrap.wrap(f"{k + 1}: {words}", 20, max_lines=4, placeholder=" …")) for k, words in enumerate(asked)]
+        rows = dict(zip((goal.name for goal in goals), degrees.T, strict=True))
+        if by is not None and len(choices) > 1:
+            heights += f", all turns by {by.title}"
+        entering = {name: row for name, row in rows.items() if not np.isnan(row).all()}
+        draw_degrees(entering, groups, heights, marks, kinds[0].SMALLER, ax=bars)
+        values = [figure.add_subplot(grid[k, 1]) for k in range(len(goals))]
+        for k, (goal, ax) in enumerate(zip(goals, values, strict=True)):
+            _draw_values(ax, goal, ranges, J[:, k], COLORS[k % len(COLORS)], last=k == len(goals) - 1)
+    return [bars, *values]
+
+
+def _draw_values(ax: Any, goal: Objective, ranges: Ranges, values: np.ndarray, color: str, last: bool) -> None:
+    """The values of one objective, turn by turn, and the ends of its range."""
+    turns = np.arange(1, len(values) + 1)
+    for end, word in ((ranges.best[goal.name], "best"), (ranges.worst[goal.name], "worst")):
+        ax.axhline(end, color=GREY, lw=0.8, ls="--", zorder=1)
+        ax.annotate(
+            word, (1.0, end), (3, 0), xycoords=("axes fraction", "data"), textcoords="offset points", va="center", fontsize=7, color=GREY
+        )
+    ax.plot(turns, values, color=color, marker="o", ms=4, lw=1.2, zorder=3)
+    ax.set_xlim(0.6, len(values) + 0.4)
+    ax.set_xticks(turns, [str(turn) for turn in turns] if last else [""] * len(turns))
+    ax.margins(y=0.12)
+    ax.set_title(f"{axis_label(goal.name, goal.unit)}, {goal.sense[:3]}", loc="left", color=color)
+    if last:
+        ax.set_xlabel("turn")
