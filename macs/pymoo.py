@@ -44,10 +44,9 @@ log = logging.getLogger(__name__)
 
 SETTINGS = tuple(one.name for one in fields(Search))
 """Names of the settings of MACS."""
+Evaluating = Callable[[np.ndarray], Population] | None
 OPTIONS = tuple(name for name, one in inspect.signature(Algorithm).parameters.items() if one.kind is not one.VAR_KEYWORD)
 """Names of what every algorithm of pymoo takes."""
-POINTS = 100
-"""Largest number of points in the result by default: as many as the populations of pymoo's algorithms have."""
 
 
 class MACS(Algorithm):
@@ -97,27 +96,8 @@ class MACS(Algorithm):
 
     Notes
     -----
-    *Generations.* `n_gen` counts iterations. The first evaluates the first population, each later one several batches: some tens of points
-    in all, with default settings. A batch has at most as many points as there are agents, or offspring of the archive; if an
-    `elementwise_runner` evaluates them in parallel, let `agents` be a multiple of the number of processes. Termination, display, history
-    and callback come after each iteration.
-
-    *Evaluations.* All are made by `algorithm.evaluator`. The number of an `n_eval` termination, also of one that is part of a collection,
-    is the budget of the search, and never exceeded. Where there is none, the size of the first population, and how many coordinates an
-    iteration may try, are those of a budget of 2000; so it is with pymoo's default terminations, whose largest number of evaluations is
-    not exceeded, either. If 100 iterations in succession find nothing new to evaluate, the run ends.
-
-    *Constraints.* A point is feasible if pymoo says so: all G <= 0 and all abs(H) <= 1e-4, or what the `config` of its Individuals says.
-    Infeasible points are ordered by their largest violation; CV is the sum of all. A failed evaluation (NaN or infinite values) is
-    infeasible, with an infinite CV.
-
-    *Ask and tell.* `ask` returns the next batch of candidates, the same ones until `tell(infills=batch)` is called with all of
-    them, in their order, with their values; their X may have been moved. Only after the last batch of an iteration does `n_gen` grow, and
-    is the callback called. The points are those that `next` finds, which may follow at any time. Each `tell` does the iteration again
-    from its beginning, with one batch more, since nothing is kept but data: that takes a millisecond or two for each point.
-
-    *Checkpoints.* A deep copy or a pickle of the algorithm, made at any time, goes on to the same points: in a callback, between `ask` and
-    `tell`, or after Ctrl-C in an evaluation. (A problem or callback of your own has to allow it, too.)
+    The page "For users of pymoo" of the manual says how generations and evaluations are counted, what is feasible, and what `ask`, `tell`,
+    copies and pickles do. All evaluations are made by `algorithm.evaluator`; the number of an `n_eval` termination is never exceeded.
 
     Examples
     --------
@@ -138,7 +118,7 @@ class MACS(Algorithm):
         for name in settings:
             if name not in SETTINGS:
                 raise TypeError(unknown("setting of MACS", name, dict.fromkeys(("sampling", *SETTINGS, *OPTIONS))))
-        search = Search(**({"archive": POINTS} | settings))
+        search = Search(**({"archive": 100} | settings))  # as many as the populations of pymoo's algorithms have
         super().__init__(output=output, **options)
         self.search = search
         self.sampling = np.array(sampling) if isinstance(sampling, list | tuple) else sampling
@@ -243,7 +223,7 @@ class MACS(Algorithm):
                 batch[i] = one
         return batch
 
-    def _iteration(self, more: Callable[[np.ndarray], Population] | None) -> tuple[SearchState, Told]:
+    def _iteration(self, more: Evaluating) -> tuple[SearchState, Told]:
         """The state after the current iteration, and the evaluator that has its individuals. Raises `Asked` if values are missing."""
         if self._budget is None:
             self._plan()
@@ -319,26 +299,10 @@ class Asked(Exception):  # noqa: N818 - a question, not an error
 
 
 class Told(BlackBox):
-    """Evaluator of a pymoo problem by its individuals: of the batches that were told, in their order, and then of others.
+    """Evaluator of a pymoo problem by its individuals: of the batches that were `told`, in their order; then of those that `more` returns,
+    evaluated, at X (k, n); without it, `Asked` is raised. `known` individuals are kept by their `place`."""
 
-    Parameters
-    ----------
-    problem : CompiledVectorProblem
-        Variables and objectives.
-    told : iterable of Population
-    more : callable, optional
-        Function that returns evaluated individuals at X (k, d). Default: `Asked` is raised.
-    known : dict
-        Individuals that are known already, by their `place`.
-    """
-
-    def __init__(
-        self,
-        problem: CompiledVectorProblem,
-        told: Iterable[Population],
-        more: Callable[[np.ndarray], Population] | None,
-        known: dict[bytes, Any],
-    ) -> None:
+    def __init__(self, problem: CompiledVectorProblem, told: Iterable[Population], more: Evaluating, known: dict[bytes, Any]) -> None:
         super().__init__(problem, tolerance=0.0)
         self.known = dict(known)
         self._told, self._more = iter(tuple(told)), more

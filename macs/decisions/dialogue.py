@@ -29,18 +29,12 @@ from ..preferences import from_dict as preference_from_dict
 from ..preferences.ranges import confidence, shown
 from .choice import Choice, Turn, degree_text
 from .decide import decide
-from .dialogue_file import FORMAT, VERSION, ChoiceRecord, DialogueRecord, TurnRecord, finite, packed, read, readable, write
+from .dialogue_file import FILE_VERSION, FORMAT, ChoiceRecord, DialogueRecord, TurnRecord, finite, packed, read, readable, write
 from .improving import around, improved, neutral
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-STEP, ROUNDS = 0.1, 5
-"""By how much, in ranges, the first alternatives ask for a better value of an objective, and how many times more at most."""
-LONGEST = 60
-"""Characters of what was asked, in a table."""
-DISTINCT = 1e-3
-"""Part of a range by which alternatives differ."""
 ONLY_RANKED = "only points that are known were ranked, since there is no problem to solve"
 BLACK_BOX = "only points that are known were ranked, since a black box has no derivatives"
 
@@ -227,7 +221,7 @@ class Dialogue:
         check_count("k", k, 1)
         now = self.choose()
         found: list[Choice] = []
-        for part in (STEP * (1 + r) for r in range(ROUNDS)):
+        for part in (0.1 * k for k in range(1, 6)):
             for goal in self.goals:
                 preference = around(self.ranges, now.point, goal, part)
                 if len(found) == k or preference is None:
@@ -277,7 +271,7 @@ class Dialogue:
             chosen = turn.choice
             values = ["-"] * len(self.goals) if chosen is None else [f"{value:.6g}" for value in chosen.objectives.values()]
             degrees = ["-"] * len(self.goals) if chosen is None else [degree_text(chosen.degrees[goal.name]) for goal in self.goals]
-            rows.append([str(k + 1), shorten(turn.asked, LONGEST, placeholder=" …"), *values, *degrees])
+            rows.append([str(k + 1), shorten(turn.asked, 60, placeholder=" …"), *values, *degrees])
         return text_table([titles, units], rows, [False, True, *[False] * (2 * len(self.goals))])
 
     def plot(self, by: Preference | None = None, figure: Any = None) -> Sequence[Axes]:
@@ -360,7 +354,7 @@ class Dialogue:
 
         return DialogueRecord(
             format=FORMAT,
-            version=VERSION,
+            version=FILE_VERSION,
             choice=None if self.choice is None else one(self.choice),
             units=dict(zip(self.front.names, self.front.units, strict=True)),
             senses=dict(zip(self.front.names, self.front.senses, strict=True)),
@@ -413,7 +407,7 @@ class Dialogue:
         taken = np.array([[*one.objectives.values()] for one in others])
 
         def new(J: np.ndarray) -> bool:
-            return bool(np.all(np.max(np.abs(taken - J) / spans, axis=1) > DISTINCT))
+            return bool(np.all(np.max(np.abs(taken - J) / spans, axis=1) > 1e-3))
 
         if self.problem is not None:
             one = self._chosen(preference)

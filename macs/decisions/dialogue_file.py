@@ -23,8 +23,8 @@ from ..fronts import files
 from ..fronts.points import Points
 from ..io.atomic import read_whole, write_whole
 
-FORMAT, VERSION = "macs dialogue", 1
-LARGEST = 2 * files.LARGEST
+FORMAT, FILE_VERSION = "macs dialogue", 1
+MOST_BYTES = 2 * files.LARGEST
 """Bytes that a file may have."""
 
 
@@ -78,7 +78,7 @@ def packed(points: Points) -> str:
 def read(path: str | PathLike[str]) -> tuple[DialogueRecord, Points]:
     """The record of a file, and its points. Raises what `Dialogue.load` says."""
     try:
-        content = read_whole(path, LARGEST)
+        content = read_whole(path, MOST_BYTES)
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no file '{path}'") from None
     except OSError as error:
@@ -115,8 +115,8 @@ def _read(content: bytes) -> tuple[DialogueRecord, Points]:
         raise ValueError("it is not JSON") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise ValueError("it is a file of something else")
-    if isinstance(data.get("version"), int) and data["version"] > VERSION:
-        raise ValueError(f"its format is version {data['version']}, this MACS reads up to version {VERSION}: update MACS")
+    if isinstance(data.get("version"), int) and data["version"] > FILE_VERSION:
+        raise ValueError(f"its format is version {data['version']}, this MACS reads up to version {FILE_VERSION}: update MACS")
     record = msgspec.convert(data, DialogueRecord)
     try:
         points = files.from_bytes(base64.b64decode(record.points, validate=True))

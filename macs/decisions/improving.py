@@ -15,9 +15,6 @@ from ..preferences import Larger, Nimbus, PhysicalProgramming, Preference, Range
 from ..preferences.preference_functions import BOUNDARIES, ObjectiveClass
 from ..preferences.ranges import named_numbers, places, shown
 
-NOTHING = 1e-9
-"""Part of a range by which a value must be better than another."""
-
 
 def improved(
     preference: Preference, ranges: Ranges, point: Point, name: str, to: float | None = None, giving: Mapping[str, float] | None = None
@@ -38,7 +35,7 @@ def improved(
         raise ValueError(f"'{name}' cannot both improve and give way")
     goal = by_name[name]
     asked = ranges.best[name] if to is None else number(to, f"the value of '{name}'")
-    if goal.sign * (now[name] - asked) <= NOTHING * float(ranges.spans(goals)[goals.index(goal)]):
+    if goal.sign * (now[name] - asked) <= 1e-9 * float(ranges.spans(goals)[goals.index(goal)]):
         what = "is at its best value" if to is None else f"is to improve to {shown(asked, goal)}, which is not better than it is"
         raise ValueError(f"'{name}' {what}: {shown(now[name], goal)}")
     if to is not None:
@@ -76,7 +73,7 @@ def around(ranges: Ranges, point: Point, goal: Objective, part: float) -> Refere
     place = point.goals.index(goal)
     span = float(ranges.spans(point.goals)[place])
     better = float(np.clip(J[place] - goal.sign * part * span, lows[place], highs[place]))
-    if abs(better - J[place]) <= NOTHING * span:
+    if abs(better - J[place]) <= 1e-9 * span:
         return None
     J[place] = better
     return ReferencePoint(dict(zip(point.objectives, J.tolist(), strict=True)))

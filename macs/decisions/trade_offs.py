@@ -31,16 +31,11 @@ from ..refinement.mesh_loop import Programs
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LEFT = 1e-3
-"""Largest part of the longest of the weighted gradients that is left of their sum at a point that is taken to be Pareto-optimal."""
-NOTHING = 1e-3
-"""Part of its gradient below which nothing is left of it within what is active."""
-EXACT, ROOM = 1e-6, 1.01
-"""Residual of the conditions of optimality that weights may leave at a point that is solved; elsewhere, so many times what is left."""
-ALIKE = 0.1
-"""Part of weights by which others are different."""
-NEGLIGIBLE = 1e-6
-"""Part of the largest weight, in ranges of the front, below which others are round-off."""
+NO_GRADIENT = 1e-3
+"""Part of a gradient that counts as none: of the weighted sum, as a part of the longest, at a Pareto-optimal point; and of one objective
+within what is active."""
+SOLVED_TO = 1e-6
+"""Residual of the conditions of optimality that weights may leave at a point that is solved."""
 
 
 def trade_offs(point: Point, *, problem: Problem | CompiledProblem | None = None) -> TradeOffs:
@@ -130,7 +125,7 @@ class TradeOffs:
         """
         if self.point.weights is not None:
             return self.point.weights
-        if self.left > LEFT:
+        if self.left > NO_GRADIENT:
             raise ValueError(f"point {self.point.index} is not on a front, so that there are no rates along one: {self._not_optimal}")
         w = self._projection.weights / self._projection.scales
         return dict(zip((goal.name for goal in self.goals), (w / w.sum()).tolist(), strict=True))
@@ -158,7 +153,7 @@ class TradeOffs:
         return float(self.rates[self._number(i), self._number(j)])
 
     def bounds(self, i: str | int, j: str | int) -> tuple[float, float]:
-        """The least and the largest dJ_i/dJ_j of all weights with which the point is as optimal as points are, to `EXACT`, or as it is
+        """The least and the largest dJ_i/dJ_j of all weights with which the point is as optimal as points are, to `SOLVED_TO`, or as it is
         with its own. At a corner of the front, these are the rates of its sides; where it bends sharply, they say how well the rate is
         known.
 
@@ -231,14 +226,14 @@ class TradeOffs:
         violation = self.point.violation
         found = [] if violation <= OPTIMAL else [f"not feasible: the violation is {violation:.1e}"]
         try:
-            found += [f"not Pareto-optimal: {self._not_optimal}"] if self.left > LEFT else []
+            found += [f"not Pareto-optimal: {self._not_optimal}"] if self.left > NO_GRADIENT else []
         except ValueError as reason:
             return (*found, f"no trade-off matrix: {reason}")
         gains = self._gains
         for i, goal in enumerate(self.goals):
             if self._fixed[i]:
                 found.append(f"the row of '{goal.name}' is degenerate: within what is active it can get no better")
-            elif (np.delete(gains[i], i) > LEFT).all():
+            elif (np.delete(gains[i], i) > NO_GRADIENT).all():
                 found.append(f"the row of '{goal.name}' has no negative entry: it and all others can get better together")
         return (*found, *self._corner)
 
@@ -284,12 +279,13 @@ class TradeOffs:
     def _corner(self) -> list[str]:
         """What is to be said where weights that differ do as well."""
         found = self._projection
-        if self.left > LEFT:
+        if self.left > NO_GRADIENT:
             return []
         heaviest = int(np.argmax(found.weights))
         for k, weight in enumerate(found.weights):
             ratio = weight / found.weights[heaviest]
-            trials = (ratio / (1.0 + ALIKE), ratio * (1.0 + ALIKE)) if weight > LEFT * ALIKE else (LEFT,)
+            # Weights that differ by a tenth.
+            trials = (ratio / 1.1, ratio * 1.1) if weight > 0.1 * NO_GRADIENT else (NO_GRADIENT,)
             if k != heaviest and any(ratio_residual(found.conditions, heaviest, k, one) <= self._residual for one in trials):
                 return [self._between(heaviest, k)]
         return []
@@ -299,13 +295,17 @@ class TradeOffs:
         low, high = self.bounds(i, j)
         name, other = self.goals[i].name, self.goals[j].name
         left = self._projection.conditions.residual
-        why = "an end, a corner or a sharp bend of the front" if left <= EXACT else f"its conditions of optimality hold to {left:.1e} only"
+        why = (
+            "an end, a corner or a sharp bend of the front"
+            if left <= SOLVED_TO
+            else f"its conditions of optimality hold to {left:.1e} only"
+        )
         return f"{why}: one more in '{other}' changes '{name}' by {low + 0.0:.4g} to {high + 0.0:.4g}"
 
     @property
     def _residual(self) -> float:
         """What weights that do as well may leave."""
-        return max(EXACT, ROOM * self._projection.conditions.residual)
+        return max(SOLVED_TO, 1.01 * self._projection.conditions.residual)
 
     @property
     def _signs(self) -> np.ndarray:
@@ -332,13 +332,11 @@ class TradeOffs:
     @property
     def _fixed(self) -> np.ndarray:
         """Mask (m,) of the objectives that can get no better within what is active."""
-        return self._slopes <= NOTHING
+        return self._slopes <= NO_GRADIENT
 
     @property
     def _not_optimal(self) -> str:
-        return (
-            f"the weighted sum of the gradients keeps {100 * self.left:.2g} % of the longest of them (on a front at most {100 * LEFT:g} %)"
-        )
+        return f"the weighted sum of the gradients keeps {100 * self.left:.2g} % of the longest of them (on a front at most {100 * NO_GRADIENT:g} %)"
 
     @cached_property
     def _projection(self) -> TangentProjection:
@@ -366,9 +364,9 @@ class TradeOffs:
 
 def rates(weights: np.ndarray, signs: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     """dJ_i/dJ_j (..., m, m) of objectives with weights (..., m), see `TradeOffs.rate`; `signs` (m,) are -1 for maximised ones. Weights
-    that are `NEGLIGIBLE` in `ranges` (m,), as far as these are known, are 0."""
+    below 1e-6 of the largest, in `ranges` (m,) as far as these are known, are round-off and count as 0."""
     worth = weights * np.where(ranges > 0, ranges, 0.0)
-    nothing = (ranges > 0) & (worth < NEGLIGIBLE * worth.max(axis=-1, keepdims=True))
+    nothing = (ranges > 0) & (worth < 1e-6 * worth.max(axis=-1, keepdims=True))
     weights = np.where(nothing, 0.0, weights)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = -np.outer(signs, signs) * (weights[..., None, :] / weights[..., :, None])
