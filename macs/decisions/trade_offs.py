@@ -336,7 +336,8 @@ class TradeOffs:
 
     @property
     def _not_optimal(self) -> str:
-        return f"the weighted sum of the gradients keeps {100 * self.left:.2g} % of the longest of them (on a front at most {100 * NO_GRADIENT:g} %)"
+        left, most = 100 * self.left, 100 * NO_GRADIENT
+        return f"the weighted sum of the gradients keeps {left:.2g} % of the longest of them (on a front at most {most:g} %)"
 
     @cached_property
     def _projection(self) -> TangentProjection:

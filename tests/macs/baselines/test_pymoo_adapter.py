@@ -5,16 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 import warnings
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
-from ascent import Ascent
 from boxes import boxed
-from fronts import distance_to_curve
 from plain import dtlz
 
 from macs import AGEMOEA2, CTAEA, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA
@@ -22,15 +20,16 @@ from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.pareto.directions import reference_directions
 from macs.pareto.dominance import nondominated
 from problems import load
-from problems.cases.goddard import reference
 from transcription import DFET
 
 NUMBA = find_spec("numba") is not None
 """Without it, all but AGE-MOEA-II is tested."""
 
 
-def age(*populations: int) -> list[AGEMOEA2]:
-    return [AGEMOEA2(population=population) for population in populations if NUMBA]
+def age(population: int) -> Any:
+    """AGE-MOEA-II as a parameter of a slow test, without numba of one that is skipped: its first use compiles what pymoo has of it."""
+    settings = AGEMOEA2(population=population) if NUMBA else None
+    return pytest.param(settings, id="AGEMOEA2", marks=[pytest.mark.slow, pytest.mark.skipif(not NUMBA, reason="without numba")])
 
 
 SMALL = [
@@ -41,14 +40,17 @@ SMALL = [
     MOPSOCD(particles=12),
     MOPSO(particles=12),
     SMSEMOA(population=12),
-    *age(12),
     RVEA(divisions=11),
     CTAEA(divisions=11),
+    age(12),
 ]
-HANDLED = [type(s)(**{**s.__dict__, "handling": h}) for s in SMALL for h in ("feasible-first", "penalty", "objective")]
+HANDLED = [replace(one, handling="objective" if k % 2 else "penalty") for k, one in enumerate(SMALL[:-1])]
+"""Each way of handling constraints with half of the algorithms; feasible-first is in `SMALL`."""
 
 
-def named(settings: Any) -> str:
+def named(settings: Any) -> str | None:
+    if settings is None:
+        return None
     return f"{type(settings).__name__}-{settings.handling}" + ("-batch" if getattr(settings, "batch", False) else "")
 
 
@@ -96,13 +98,9 @@ def theirs(settings: Any, m: int) -> Any:
 
 
 CASES = [
-    *((settings, name) for settings in (NSGA2(), NSGA3(), MOPSOCD(archive=500)) for name in ("zdt4", "dtlz2")),
-    *((MOEAD(divisions=divisions, batch=batch), n) for batch in (False, True) for divisions, n in ((19, "zdt1"), (4, "dtlz2"))),
-    (NSGA2(population=30), "zdt1"),
-    (NSGA3(population=20, divisions=4), "dtlz7"),
-    *((settings, name) for settings in (SMSEMOA(), *age(100), RVEA(), CTAEA()) for name in ("zdt4", "dtlz2")),
+    *((settings, name) for settings in (NSGA2(), NSGA3(), MOPSOCD(archive=500), SMSEMOA(), RVEA(), CTAEA()) for name in ("zdt4", "dtlz2")),
+    *((MOEAD(divisions=divisions, batch=batch), name) for batch in (False, True) for divisions, name in ((19, "zdt1"), (4, "dtlz2"))),
     (RVEA(population=20, divisions=4, alpha=1.0, adapt_every=0.3), "dtlz7"),
-    (CTAEA(divisions=19), "zdt1"),
 ]
 
 
@@ -135,27 +133,24 @@ def test_so_are_fronts() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("m", [2, 3])
 @pytest.mark.parametrize(
     "settings",
-    [NSGA2(population=40), SMSEMOA(population=40), *age(40), RVEA(population=40, divisions=6), CTAEA(divisions=7)],
+    [NSGA2(population=40), SMSEMOA(population=40), age(40), RVEA(population=40, divisions=6), CTAEA(divisions=7)],
     ids=lambda settings: type(settings).__name__,
 )
-def test_with_one_constraint_they_are_still_pymoo_s_own_if_interrupted_too(settings: Any, m: int) -> None:
+def test_with_one_constraint_they_are_still_pymoo_s_own_if_interrupted_too(settings: Any) -> None:
     from pymoo.core.problem import Problem
     from pymoo.optimize import minimize
 
     class Ring(Problem):
         def __init__(self) -> None:
-            super().__init__(n_var=4, n_obj=m, n_ieq_constr=1, xl=-2.0, xu=2.0)
+            super().__init__(n_var=4, n_obj=3, n_ieq_constr=1, xl=-2.0, xu=2.0)
 
         def _evaluate(self, X: np.ndarray, out: dict, *args: Any, **kwargs: Any) -> None:
-            out["F"] = np.stack([((X - middle) ** 2).sum(axis=1) for middle in (0, 1, [1, 0, 0, -1])[:m]], axis=1)
+            out["F"] = np.stack([((X - middle) ** 2).sum(axis=1) for middle in (0, 1, [1, 0, 0, -1])], axis=1)
             out["G"] = (0.81 - ((X - 0.5) ** 2).sum(axis=1))[:, None] * (X[:, :1] < 1.5)
 
-    if isinstance(settings, RVEA) and m == 2:
-        settings = RVEA(population=40, divisions=29)
-    truth = minimize(Ring(), theirs(settings, m), ("n_gen", 15), seed=2)
+    truth = minimize(Ring(), theirs(settings, 3), ("n_gen", 15), seed=2)
     budget = truth.algorithm.evaluator.n_eval
     for between in (None, lambda state: rebuilt(type(state), plain(state))):
         state = run(settings, boxed(Ring(), tolerance=0.0), budget, seed=2, between=between)
@@ -249,31 +244,18 @@ def constrained(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return schaffer(X), np.abs(((X - 0.5) ** 2).sum(axis=1, keepdims=True) - 1) - 0.1
 
 
-@pytest.mark.parametrize(
-    ("settings", "function"),
-    [*((settings, schaffer) for settings in SMALL), *((settings, constrained) for settings in HANDLED)],
-    ids=lambda value: named(value) if is_dataclass(value) else value.__name__,
-)
-def test_a_state_that_was_data_for_a_while_goes_on_with_the_same_bits(settings: Any, function: Any) -> None:
-    box = partial(boxed, function, [(-2, 2)] * 3)
+@pytest.mark.parametrize("settings", [*SMALL, *HANDLED], ids=named)
+def test_a_state_that_was_data_for_a_while_goes_on_with_the_same_bits_and_another_seed_with_others(settings: Any) -> None:
+    box = partial(boxed, constrained, [(-2, 2)] * 3)
     straight = run(settings, box(), 80)
     broken = run(settings, box(), 80, between=lambda state: rebuilt(type(state), plain(state)))
     for name, value in plain(straight).items():
         np.testing.assert_equal(plain(broken)[name], value)
+    assert not np.array_equal(run(settings, box(), 80, seed=2).members.Z, straight.members.Z)
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [
-        NSGA2(population=20),
-        NSGA3(divisions=3),
-        MOPSOCD(particles=20, archive=500),
-        SMSEMOA(population=20),
-        *age(20),
-        RVEA(divisions=4, adapt_every=0.2),
-        CTAEA(divisions=3),
-    ],
-    ids=named,
+    "settings", [NSGA3(divisions=3), MOPSOCD(particles=20, archive=500), RVEA(divisions=4, adapt_every=0.2), CTAEA(divisions=3)], ids=named
 )
 def test_interrupted_on_dtlz2_they_still_equal_pymoo(settings: Any) -> None:
     from pymoo.optimize import minimize
@@ -285,21 +267,7 @@ def test_interrupted_on_dtlz2_they_still_equal_pymoo(settings: Any) -> None:
     assert np.array_equal(state.members.F, truth.pop.get("F"))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "settings",
-    [NSGA2(population=8), NSGA3(divisions=15), MOEAD(divisions=9), MOPSOCD(particles=20, archive=12), MOPSO(particles=20), *SMALL[6:]],
-    ids=named,
-)
-def test_the_same_seed_gives_the_same_bits_and_another_seed_others(settings: Any) -> None:
-    def go(seed: int) -> Any:
-        return settings.minimize(constrained, [(-2, 2)] * 3, evaluations=150, seed=seed).decision
-
-    assert np.array_equal(go(1), go(1))
-    assert not np.array_equal(go(1), go(2))
-
-
-@pytest.mark.parametrize("budget", [1, 2, 5, 11, 12, 13, 24, 57])
+@pytest.mark.parametrize("budget", [1, 11, 13, 57])
 @pytest.mark.parametrize("settings", SMALL, ids=named)
 def test_the_budget_is_met_exactly(settings: Any, budget: int) -> None:
     rows = []
@@ -314,7 +282,7 @@ def test_the_budget_is_met_exactly(settings: Any, budget: int) -> None:
     assert nondominated(front.F).all()
 
 
-@pytest.mark.parametrize("settings", HANDLED, ids=named)
+@pytest.mark.parametrize("settings", [*SMALL, *HANDLED], ids=named)
 def test_failures_and_constraints_stop_no_solver(settings: Any) -> None:
     def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         F, G = constrained(X)
@@ -330,7 +298,7 @@ def test_failures_and_constraints_stop_no_solver(settings: Any) -> None:
     assert set(front.status) == {"converged"}
 
 
-@pytest.mark.parametrize("settings", HANDLED, ids=named)
+@pytest.mark.parametrize("settings", [*SMALL, *HANDLED], ids=named)
 @pytest.mark.parametrize("what", ["infeasible", "failed"])
 def test_without_feasible_points_the_message_has_the_nearest(settings: Any, what: str) -> None:
     seen: list[float] = []
@@ -372,7 +340,7 @@ def test_a_single_objective() -> None:
 
 
 @pytest.mark.parametrize("settings", SMALL, ids=named)
-@pytest.mark.parametrize("count", [1, 12, 30])
+@pytest.mark.parametrize("count", [1, 30])
 def test_a_start_is_evaluated_first_and_is_of_use(settings: Any, count: int) -> None:
     asked: list[np.ndarray] = []
 
@@ -418,12 +386,6 @@ def test_the_population_goes_where_the_evaluator_moves_it_and_starts_from_there(
     assert np.abs(np.vstack(box.sent)[:, :3]).max() <= 2
 
 
-def test_on_the_lunar_ascent_in_numpy() -> None:
-    state = run(NSGA2(population=40), Ascent(), 600)
-    assert (state.archive.violation <= 1e-9).all()
-    assert distance_to_curve(state.archive.F, reference() * [1, -1]).mean() < 0.2
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("settings", [SMALL[1], SMALL[2]], ids=named)
 def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
@@ -441,63 +403,49 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
 # What is refused
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: NSGA2(population=1), "NSGA2: population must be a whole number of at least 2, not 1"),
-        (lambda: NSGA2(population=None), "NSGA2: population must be a whole number of at least 2, not None"),  # type: ignore[arg-type]
-        (lambda: NSGA2(handling="death"), "NSGA2: handling must be one of 'feasible-first', 'penalty', 'objective', not 'death'"),
-        (lambda: NSGA2(crossover=1.5), r"NSGA2: crossover must be in \[0, 1\], not 1.5"),
-        (lambda: NSGA2(penalty=-1.0), r"NSGA2: penalty must be in \[0, inf\), not -1.0"),
-        (lambda: NSGA3(divisions=0), "NSGA3: divisions"),
-        (lambda: NSGA3(whole=1), "NSGA3: whole must be True or False, not 1"),  # type: ignore[arg-type]
-        (lambda: NSGA3(mutation_eta="x"), "NSGA3: mutation_eta"),  # type: ignore[arg-type]
-        (lambda: MOEAD(neighbors=1), "MOEAD: neighbors"),
-        (lambda: MOEAD(decomposition="sum"), "MOEAD: decomposition"),
-        (lambda: MOEAD(batch=2), "MOEAD: batch"),  # type: ignore[arg-type]
-        (lambda: MOPSOCD(particles=2.5), "MOPSOCD: particles"),  # type: ignore[arg-type]
-        (lambda: MOPSOCD(max_velocity=0.0), "MOPSOCD: max_velocity"),
-        (lambda: SMSEMOA(population=1), "SMSEMOA: population must be a whole number of at least 2, not 1"),
-        (lambda: SMSEMOA(crossover=-0.5), r"SMSEMOA: crossover must be in \[0, 1\], not -0.5"),
-        (lambda: AGEMOEA2(mutation_eta=0.5), r"AGEMOEA2: mutation_eta must be in \[1, 100\], not 0.5"),
-        (lambda: AGEMOEA2(handling="death"), "AGEMOEA2: handling must be one of 'feasible-first', 'penalty', 'objective', not 'death'"),
-        (lambda: RVEA(divisions=0), "RVEA: divisions must be a whole number of at least 1, not 0"),
-        (lambda: RVEA(alpha=-1.0), r"RVEA: alpha must be in \[0, inf\), not -1.0"),
-        (lambda: RVEA(adapt_every=0.0), r"RVEA: adapt_every must be in \(0, 1\], not 0.0"),
-        (lambda: CTAEA(population=2.5), "CTAEA: population must be a whole number of at least 2, not 2.5"),  # type: ignore[arg-type]
-        (lambda: CTAEA(crossover_eta=101), r"CTAEA: crossover_eta must be in \[1, 100\], not 101"),
-        (lambda: NSGA2(degree="mean"), "NSGA2: degree must be one of 'largest', 'sum', 'log', 'printed', not 'mean'"),
-        (lambda: MOPSO(particles=0), "MOPSO: particles must be a whole number of at least 1, not 0"),
-        (lambda: MOPSO(archive=0), "MOPSO: archive must be a whole number of at least 1"),
-        (lambda: MOPSO(cells=2.5), "MOPSO: cells must be a whole number of at least 1, not 2.5"),  # type: ignore[arg-type]
-        (lambda: MOPSO(search=1.5), r"MOPSO: search must be in \[0, 1\], not 1.5"),
-        (lambda: MOPSO(final_inertia=-1), r"MOPSO: final_inertia must be in \[0, inf\), not -1"),
-        (lambda: MOPSO(handling="death"), "MOPSO: handling must be one of"),
-    ],
-)
-def test_settings_that_make_no_sense(make: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make()
+REFUSED: list[tuple[type, dict[str, Any], str]] = [
+    (NSGA2, {"population": 1}, "population must be a whole number of at least 2, not 1"),
+    (NSGA2, {"population": None}, "population must be a whole number of at least 2, not None"),
+    (NSGA2, {"handling": "death"}, "handling must be one of 'feasible-first', 'penalty', 'objective', not 'death'"),
+    (NSGA2, {"penalty": -1.0}, r"penalty must be in \[0, inf\), not -1.0"),
+    (NSGA2, {"degree": "mean"}, "degree must be one of 'largest', 'sum', 'log', 'printed', not 'mean'"),
+    (SMSEMOA, {"crossover": -0.5}, r"crossover must be in \[0, 1\], not -0.5"),
+    (AGEMOEA2, {"mutation_eta": 0.5}, r"mutation_eta must be in \[1, 100\], not 0.5"),
+    (NSGA3, {"divisions": 0}, "divisions must be a whole number of at least 1, not 0"),
+    (NSGA3, {"whole": 1}, "whole must be True or False, not 1"),
+    (NSGA3, {"mutation_eta": "x"}, "mutation_eta"),
+    (MOEAD, {"neighbors": 1}, "neighbors"),
+    (MOEAD, {"neighbor_mating": 1.1}, "neighbor_mating"),
+    (MOEAD, {"decomposition": "sum"}, "decomposition"),
+    (MOEAD, {"batch": 2}, "batch must be True or False"),
+    (RVEA, {"alpha": -1.0}, r"alpha must be in \[0, inf\), not -1.0"),
+    (RVEA, {"adapt_every": 0.0}, r"adapt_every must be in \(0, 1\], not 0.0"),
+    (CTAEA, {"population": 2.5}, "population must be a whole number of at least 2, not 2.5"),
+    (MOPSOCD, {"particles": 1}, "particles must be a whole number of at least 2"),
+    (MOPSOCD, {"max_velocity": 0.0}, "max_velocity"),
+    (MOPSO, {"particles": 0}, "particles must be a whole number of at least 1, not 0"),
+    (MOPSO, {"archive": 0}, "archive must be a whole number of at least 1"),
+    (MOPSO, {"cells": 2.5}, "cells must be a whole number of at least 1, not 2.5"),
+    (MOPSO, {"search": 1.5}, r"search must be in \[0, 1\], not 1.5"),
+    (MOPSO, {"final_inertia": -1}, r"final_inertia must be in \[0, inf\), not -1"),
+]
+
+
+@pytest.mark.parametrize(("kind", "settings", "message"), REFUSED, ids=lambda value: getattr(value, "__name__", None))
+def test_settings_that_make_no_sense(kind: type, settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=f"{kind.__name__}: {message}"):
+        kind(**settings)
 
 
 @pytest.mark.parametrize(
     ("settings", "m", "message"),
     [
-        (NSGA3(), 1, "NSGA3 needs at least two objectives, not 1"),
-        (MOEAD(), 1, "MOEAD needs at least two objectives, not 1"),
+        *((kind(), 1, f"{kind.__name__} needs at least two objectives, not 1") for kind in (NSGA3, MOEAD, SMSEMOA, RVEA, CTAEA)),
         (NSGA3(population=2), 3, "NSGA3: population=2 is too few: 3 objectives"),
         (NSGA3(population=50, divisions=12), 3, "makes 91 reference directions with 3 objectives, more than population=50"),
         (NSGA3(population=120, divisions=3), 4, "makes 20 .* too few for population=120; divisions=7 makes 120"),
         (NSGA3(divisions=12, population=91, handling="objective"), 3, "makes 455 reference directions with 4 objectives"),
-        (SMSEMOA(), 1, "SMSEMOA needs at least two objectives, not 1"),
-        *((settings, 1, "AGEMOEA2 needs at least two objectives, not 1") for settings in age(100)),
-        (RVEA(), 1, "RVEA needs at least two objectives, not 1"),
-        (CTAEA(), 1, "CTAEA needs at least two objectives, not 1"),
-        (
-            RVEA(population=50, divisions=12),
-            3,
-            "RVEA: divisions=12 makes 91 reference directions with 3 objectives, more than population=50",
-        ),
+        (RVEA(population=50, divisions=12), 3, "RVEA: divisions=12 makes 91 .*, more than population=50"),
         (CTAEA(population=92, divisions=12), 3, "CTAEA: divisions=12 makes 91 .*, and population=92 needs as many"),
         (MOEAD(population=92, divisions=12), 3, "MOEAD: divisions=12 makes 91 reference directions with 3 objectives, and population=92"),
     ],
