@@ -92,6 +92,8 @@ def test_every_method_finds_its_optimum(preference: Preference, T: float, values
     # On the front, and known to be there.
     assert choice.objectives["effort"] == pytest.approx(effort(choice.objectives["time"]), rel=1e-7)
     assert choice.point.optimality < 1e-6 and choice.point.verified and choice.point.status == "converged"
+    # So does the ranking of a dense front.
+    assert preference.rank(dense(), RANGES).best.objectives["time"] == pytest.approx(choice.objectives["time"], abs=4e-4)
 
 
 @pytest.mark.slow
@@ -158,11 +160,11 @@ KINKS: list[tuple[FuzzySatisfactory, float]] = [
 ]
 
 
-@pytest.mark.parametrize("begun", [0, 1], ids=["from slow", "from quick"])
-@pytest.mark.parametrize(("preference", "T"), KINKS, ids=[repr(one[0]) for one in KINKS])
-def test_solves_do_not_stall_at_kinks_of_memberships(preference: FuzzySatisfactory, T: float, begun: int) -> None:
-    """Optima at kinks, and behind kinks that lie on the way."""
-    choice = decide(cart(), MESH, preference, ranges=RANGES, start=ends()[begun])
+@pytest.mark.parametrize("k", range(len(KINKS)), ids=[repr(one[0]) for one in KINKS])
+def test_solves_do_not_stall_at_kinks_of_memberships(k: int) -> None:
+    """Optima at kinks, and behind kinks that lie on the way; from the slow end and from the quick one in turn."""
+    preference, T = KINKS[k]
+    choice = decide(cart(), MESH, preference, ranges=RANGES, start=ends()[(k + k // 2) % 2])
     # What the closed form says is right: no point of the front, in steps of 2e-4, is better.
     ranking = preference.rank(dense(), RANGES)
     assert ranking.best.objectives["time"] == pytest.approx(T, abs=2.1e-4)
@@ -332,7 +334,7 @@ def front() -> Front:
     return sweep(cart(), MESH, points=31, starts=1)
 
 
-@pytest.mark.parametrize("preference", [one[0] for one in KNOWN], ids=[repr(one[0]) for one in KNOWN])
+@pytest.mark.parametrize("preference", [one[0] for one in KNOWN[::3]], ids=[repr(one[0]) for one in KNOWN[::3]])
 def test_never_worse_than_the_best_ranked(preference: Preference) -> None:
     ranking = preference.rank(front(), RANGES)
     choice = decide(cart(), MESH, preference, ranges=RANGES, start=front())
@@ -347,12 +349,6 @@ def dense() -> Front:
     goals = cart().compile().goals
     F = np.stack([12 / T**3, T], axis=1)
     return Front(F=F, decision=np.empty((len(T), 0)), violation=np.zeros(len(T)), status=["converged"] * len(T), goals=goals)
-
-
-@pytest.mark.parametrize("preference", [one[0] for one in KNOWN], ids=[repr(one[0]) for one in KNOWN])
-def test_a_ranked_dense_front_agrees(preference: Preference) -> None:
-    choice = decide(cart(), MESH, preference, ranges=RANGES, start=ends())
-    assert preference.rank(dense(), RANGES).best.objectives["time"] == pytest.approx(choice.objectives["time"], abs=4e-4)
 
 
 def test_the_best_that_is_known_stands_where_solves_fail() -> None:

@@ -195,11 +195,8 @@ for _ in range(2000):
     ("data", "words"),
     [
         (None, "a preference must be a table of method, settings, not None"),
-        ([1], "a preference must be a table"),
         ({}, "unknown preference None; there are WeightedSum"),
         ({**GOOD, "method": "Referencepoint"}, "unknown preference 'Referencepoint', did you mean ReferencePoint?"),
-        ({**GOOD, "method": ["x"]}, "unknown preference"),
-        ({**GOOD, "method": "_Ordered"}, "unknown preference '_Ordered'"),
         ({**GOOD, "more": 1}, "a preference: unknown key 'more'"),
         ({**GOOD, "settings": 3}, "ReferencePoint must be a table of aspiration, reservation, augmentation, not 3"),
         ({**GOOD, "settings": {"aspirations": {"time": 2.0}}}, "ReferencePoint: unknown key 'aspirations', did you mean aspiration?"),
@@ -209,7 +206,6 @@ for _ in range(2000):
         ({**GOOD, "settings": {"aspiration": {"time": float("nan")}}}, "must be finite"),
         ({**GOOD, "settings": {"aspiration": {"a\nb": "2"}}}, "ReferencePoint: the aspiration of 'a b' must be a number"),
         ({**GOOD, "settings": {"aspiration": DEEP}}, "nested too deeply"),
-        ({"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "Larger"}}}}, "must be a list of numbers, not None"),
         ({"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "os.system"}}}}, "unknown class 'os.system'"),
         (
             {"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "Smaller", "boundaries": [3, 2, 1, 0, -1]}}}},
@@ -226,10 +222,6 @@ for _ in range(2000):
         (
             {"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "Larger"}}}},
             "PhysicalProgramming: the boundaries of Larger must be a list of numbers, not None",
-        ),
-        (
-            {"method": "PhysicalProgramming", "settings": {"classes": {"a": {"class": "x"}}}},
-            "there are Smaller, Larger, Value, Range, Around",
         ),
         ("x" * 500, "a preference must be a table of method, settings, not 'xxx"),
         ({"method": "FuzzyGoal", "settings": {"targets": {"time": {"class": "Around", "vale": 2}}}}, "Around: unknown key 'vale'"),

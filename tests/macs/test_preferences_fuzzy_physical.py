@@ -7,7 +7,6 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from choices import cart
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
@@ -129,16 +128,3 @@ def test_a_spread_is_a_part_of_the_ranges_or_in_units_of_each_objective():
     part = FuzzyPhysicalProgramming(classes, spread=0.5)
     assert part.spreads == {"a": 0.5, "b": 0.75}
     assert FuzzyPhysicalProgramming(classes, spread={"a": 0.5, "b": 0.75}).spreads == part.spreads
-
-
-def test_a_front_by_fuzzy_and_by_crisp_preferences():
-    classes = {"time": Smaller.even(1.5, 3.5), "effort": Smaller(0.3, 0.8, 1.6, 3.0, 6.0)}
-    front = cart(301)
-    crisp = PhysicalProgramming(classes).rank(front)
-    narrow = FuzzyPhysicalProgramming(classes, spread=1e-4).rank(front)
-    wide = FuzzyPhysicalProgramming(classes, spread=0.5).rank(front)
-    met = np.isfinite(crisp.values)
-    assert np.array_equal(met, np.isfinite(wide.values))
-    assert narrow.values[met] == pytest.approx(crisp.values[met], abs=1e-6)
-    assert np.all(wide.values[met] > crisp.values[met] + 1e-4)
-    assert wide.degrees == pytest.approx(crisp.degrees)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
-from choices import cart, plain_front, turned_cart
+from choices import cart
 
 from macs.decisions import (
     Around,
@@ -69,6 +68,16 @@ NOW = {"time": 2.0, "effort": 1.5}
         (lambda: Nimbus(NOW, improve="time", free=["effort"]), "improve must be a list of names"),
         (lambda: Nimbus(NOW, improve=["time"], free=["effort"], enough=True), "values of `to` cannot be enough while others"),
         (lambda: Nimbus(NOW, to={"time": 1.5}, free=["effort"], enough=1), "enough must be True or False"),
+        (lambda: GoalProgramming(3), "the targets must be a dict by name"),
+        (lambda: Around(1.0, "12"), "the tolerance of Around must be a number"),
+        (lambda: Around(1.0, (-1.0, 2.0)), "the tolerance of Around below must be positive"),
+        (lambda: Around(1.0, (1.0, -2.0)), "the tolerance of Around above must be positive"),
+        (lambda: FuzzySatisfactory(3, ["time", "effort"]), "the targets must be a dict by name"),
+        (lambda: ReferencePoint(BOTH, {"time": "x"}), "the reservation of 'time' must be a number"),
+        (lambda: Nimbus({"time": "x"}, improve=["time"]), "the current value of 'time' must be a number"),
+        (lambda: Nimbus(NOW, to=[1.0]), "'to' must be a dict by name"),
+        (lambda: Nimbus(NOW, until=[1.0]), "'until' must be a dict by name"),
+        (lambda: Nimbus(NOW, improve=["time"], free=["effort"], augmentation=-0.1), "augmentation must be in [0, 1]"),
         (lambda: Smaller(1, 2, 3, 4), "Smaller needs 5 boundaries"),
         (lambda: Smaller(1, 2, 3, 3, 4), "the boundaries of Smaller must increase"),
         (lambda: Larger(1, 2, 3, 4, 5), "the boundaries of Larger must decrease"),
@@ -136,38 +145,6 @@ def test_what_is_wrong_for_a_front(make, words):
         preference.rank(front)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_nimbus_needs_a_class_for_each_objective():
-    three = plain_front(np.eye(3), [*cart(2).goals, *turned_cart(2).goals[:1]])
-    three = three.replace()
-    three.goals = (*three.goals[:2], type(three.goals[0])("mass"))
-    with pytest.raises(ValueError, match="'mass' is in no class of Nimbus"):
-        Nimbus({"time": 1.0, "effort": 1.0, "mass": 1.0}, improve=["time"], free=["effort"]).rank(three)
-
-
-def test_ranges_of_another_problem():
-    front = cart(11)
-    with pytest.raises(ValueError, match="the ranges have no 'effort'"):
-        WeightedSum({"time": 1.0}).rank(front, Ranges({"time": 1.0}, {"time": 2.0}))
-    with pytest.raises(ValueError, match="unknown objective 'mass'"):
-        WeightedSum({"time": 1.0}).rank(front, Ranges({"time": 1.0, "mass": 1.0}, {"time": 2.0, "mass": 2.0}))
-    with pytest.raises(ValueError, match=r"'time' is minimized, so that its best value, 4 s, cannot be worse than 1 s"):
-        WeightedSum({"time": 1.0}).rank(front, Ranges({"time": 4.0, "effort": 0.0}, {"time": 1.0, "effort": 5.0}))
-    with pytest.raises(ValueError, match="WeightedSum needs the ranges of the objectives"):
-        WeightedSum({"time": 1.0}).stages(front.goals, None)
-    with pytest.raises(ValueError, match="a front is ranked, not"):
-        WeightedSum({"time": 1.0}).rank([1.0, 2.0])
-
-
-def test_preferences_are_shown_as_they_are_written():
-    shown = [
-        WeightedSum({"time": 1.0}),
-        GoalProgramming({"time": Around(2.0)}, priorities=[("time",)]),
-        FuzzyPhysicalProgramming({"time": Smaller(1, 2, 3, 4, 5)}, spread=0.2),
-    ]
-    for preference in shown:
-        assert eval(repr(preference)) == preference
 
 
 def test_a_value_is_shown_with_its_unit_and_six_digits():

@@ -12,7 +12,7 @@ from choices import cart, plain_front
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-from synthetic_fronts import black_box, empty, flights, marked
+from synthetic_fronts import black_box, flights, marked
 
 from macs import MACS
 from macs.decisions import (
@@ -27,11 +27,9 @@ from macs.decisions import (
     Ranges,
     ReferencePoint,
     Smaller,
-    Stage,
     Value,
     WeightedSum,
 )
-from macs.preferences.stage import ordering
 from problems.compiled import Objective
 
 EQUAL = WeightedSum({"time": 1.0, "height": 1.0})
@@ -43,22 +41,6 @@ def drawn(axes) -> bytes:
         picture = io.BytesIO()
         np.atleast_1d(axes)[0].figure.savefig(picture, format="png", dpi=50)
     return picture.getvalue()
-
-
-def test_the_order_is_that_of_the_values():
-    ranking = EQUAL.rank(flights(40))
-    assert sorted(ranking.order) == list(range(40))
-    assert np.all(np.diff(ranking.values[ranking.order]) >= 0)
-    assert ranking.best.index == ranking.order[0] == np.argmin(ranking.values)
-    assert ranking.best.objectives == flights(40)[ranking.order[0]].objectives
-
-
-def test_points_that_are_not_feasible_are_last_and_count_in_no_range():
-    front = flights(5, status=["infeasible", "converged", "converged", "failed", "timeout"])
-    ranking = EQUAL.rank(front)
-    assert set(ranking.order[:2]) == {1, 2}
-    assert ranking.ranges == Ranges.of(front[1:3])
-    assert ranking.message == ""
 
 
 def test_points_that_were_not_confirmed_come_after_those_that_were():
@@ -123,15 +105,6 @@ def test_hard_limits_come_before_simulations_and_these_before_values(points):
     assert keys == sorted(keys)
 
 
-def test_a_front_without_feasible_points_is_not_ranked():
-    with pytest.raises(ValueError, match=r"^the front has no feasible point to rank: no feasible point: 'climb.load' is violated most$"):
-        EQUAL.rank(empty())
-    with pytest.raises(ValueError, match=r"^the front has no feasible point to rank$"):
-        EQUAL.rank(flights(2, status=["failed", "infeasible"]))
-    with pytest.raises(ValueError, match=r"^the front has no feasible point, so that it has no ranges: no feasible point"):
-        Ranges.of(empty())
-
-
 def test_one_point_is_the_best_of_any_preference():
     front = flights(1)
     J = front[0].objectives
@@ -161,14 +134,6 @@ def test_an_objective_that_is_not_a_number_is_never_best():
     assert ranking.ranges == Ranges({"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 2.0})
 
 
-def test_ranges_are_those_of_points_that_are_not_dominated():
-    front = plain_front([[1, 5], [2, 2], [3, 1], [9, 9]], [Objective("a"), Objective("b", "", "maximize")])
-    assert Ranges.of(front) == Ranges({"a": 1.0, "b": 9.0}, {"a": 9.0, "b": 5.0})
-    assert Ranges.of(plain_front([[1, 5], [2, 2], [3, 1], [9, 9]], [Objective("a"), Objective("b")])) == Ranges(
-        {"a": 1.0, "b": 1.0}, {"a": 3.0, "b": 5.0}
-    )
-
-
 def test_given_ranges_normalise():
     front, wide = cart(11), Ranges({"time": 0.0, "effort": 0.0}, {"time": 10.0, "effort": 100.0})
     ranking = WeightedSum({"time": 1.0, "effort": 1.0}).rank(front, wide)
@@ -190,36 +155,6 @@ def test_black_boxes_are_ranked():
     assert distance[ranking.order[0]] == distance.min()
     assert "a" in ranking.table()
     assert drawn(ranking.plot())
-
-
-def test_a_table_shows_the_best_points_first():
-    ranking = FuzzyGoal({"time": 2.0, "effort": 1.0}, tolerances={"time": 1.0, "effort": 1.0}).rank(cart(30))
-    lines = ranking.table(5).splitlines()
-    assert lines[0] == repr(ranking.preference)
-    assert [line.split()[1] for line in lines[5:10]] == [str(i) for i in ranking.order[:5]]
-    assert lines[10] == "... 25 more points"
-    assert len(ranking.table(None).splitlines()) == 35
-    last = ranking.table(None).splitlines()[-1]
-    assert last.split()[4] == "-"
-    none = PhysicalProgramming({"time": Smaller.even(0.1, 1.0)}).rank(cart(3)).table()
-    assert none.splitlines()[-1] == "No point meets all hard limits; none has time at most 1 s."
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("m", [1, 2, 3, 5])
-@pytest.mark.parametrize("n", [1, 9])
-def test_figures_of_any_number_of_objectives(m, n):
-    front = black_box(n, m)
-    ranking = WeightedSum({"f0": 1.0}).rank(front)
-    assert drawn(ranking.plot())
-    assert drawn(ranking.plot_functions())
-    assert drawn(ranking.plot_degrees())
-    limited = PhysicalProgramming({"f0": Smaller.even(-1.0, 0.5)}).rank(front)
-    assert drawn(limited.plot())
-    doubtful = marked(front, [True] * (n - n // 2) + [False] * (n // 2))
-    ax = WeightedSum({"f0": 1.0}).rank(doubtful).plot()
-    assert drawn(ax)
-    assert ("not feasible or not verified" in ax.get_legend_handles_labels()[1]) == (n > 1)
 
 
 @pytest.mark.slow
@@ -265,30 +200,3 @@ def test_degrees_of_choices_are_of_one_problem():
         EQUAL.plot_degrees({"one": flights(2)[0], "other": black_box(2)[0]}, Ranges.of(flights(2)))
     with pytest.raises(ValueError, match="choices must be a dict of points by name"):
         EQUAL.plot_degrees([flights(2)[0]])
-
-
-def test_a_payoff_table_keeps_ends_that_are_not_verified():
-    ends = [[1.0, 5.0], [3.0, 1.0]]
-    goals = [Objective("a"), Objective("b")]
-    whole = Ranges({"a": 1.0, "b": 1.0}, {"a": 3.0, "b": 5.0})
-    table = marked(plain_front(np.array(ends), goals, solver={"name": "payoff"}), [True, False])
-    assert Ranges.of(table) == whole
-    # Of another front, too, one point alone would be no range.
-    assert Ranges.of(marked(plain_front(np.array(ends), goals), [True, False])) == whole
-    three = marked(plain_front(np.array([*ends, [2.0, 2.0]]), goals), [True, True, False])
-    assert Ranges.of(three) == Ranges({"a": 1.0, "b": 2.0}, {"a": 2.0, "b": 5.0})
-    assert Ranges.of(three.replace(solver={"name": "payoff"})) == whole
-
-
-def test_values_that_are_as_good_as_the_best_are_told_apart_by_the_next_stage():
-    J = np.array([[1.0, 3.0], [1.0 + 5e-7, 2.0], [1.0 + 9e-7, 1.0], [1.0 + 2e-6, 0.0], [0.0, 9.0]])
-    stages = (Stage("first", lambda J, peaks: J[0]), Stage("second", lambda J, peaks: J[1]))
-    kind = np.array([0, 0, 0, 0, 1])
-    assert list(ordering(stages, J, kind, same=1e-6).order) == [2, 1, 0, 3, 4]
-    assert list(ordering(stages, J, kind, same=1e-9).order) == [0, 1, 2, 3, 4]
-    # The last stage tells all differences; where there is none, points keep their places, or the tie decides.
-    one = stages[:1]
-    assert list(ordering(one, J[[1, 0, 1]], np.zeros(3), same=1.0).order) == [1, 0, 2]
-    assert list(ordering(one, J[[1, 0, 1]], np.zeros(3), np.array([2.0, 0.0, 1.0])).order) == [1, 2, 0]
-    limited = (Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1] - 2.0], limit_names=("b at most 2",)),)
-    assert list(ordering(limited, J, kind).order) == [1, 2, 3, 0, 4]

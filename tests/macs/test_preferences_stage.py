@@ -1,14 +1,19 @@
-"""Stages on their own: values, excesses over limits and their words, and the order of points by them."""
+"""Stages on their own: operands, values, excesses over limits and their words, the order of points; and a preference of the user's own."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
+from choices import cart
 
-from macs.decisions import Stage
-from macs.preferences.stage import LIMIT_TOL, exceeded, ordering
+from macs.decisions import Preference, Stage
+from macs.preferences.stage import LIMIT_TOL, clipped, exceeded, exp, greatest, least, log10, ordering
 from problems.compiled import Objective
 
 GOALS = (Objective("time", "s"), Objective("mass", "kg", "maximize"), Objective("risk"))
@@ -152,3 +157,68 @@ def test_ties_are_told_apart_by_what_is_given_or_keep_their_places() -> None:
 def test_what_has_no_value_comes_last_and_keeps_its_places() -> None:
     limited = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1]])
     assert ordered([limited, FREE], rows((1.0, np.nan), (0.0, np.inf), (2.0, 0.0), (0.0, 0.5), (1.0, 0.5))) == [2, 3, 4, 0, 1]
+
+
+# Operands
+
+
+ALL: dict[str, tuple[Callable[[Any], Any], Callable[[float], float]]] = {
+    "exp": (exp, math.exp),
+    "log10": (log10, math.log10),
+    "greatest": (lambda x: greatest(x, 2.0), lambda x: max(x, 2.0)),
+    "least": (lambda x: least(x, 2.0), lambda x: min(x, 2.0)),
+    "clipped": (lambda x: clipped(x, 1.5, 3.0), lambda x: min(max(x, 1.5), 3.0)),
+}
+
+
+@pytest.mark.filterwarnings("error")  # CasADi warns of numpy's functions on its symbols
+@pytest.mark.parametrize("name", ALL)
+def test_all_operands_give_the_same(name: str) -> None:
+    function, expected = ALL[name]
+    for x in (0.25, 1.0, 2.0, 2.5, 10.0):
+        for operand in (x, np.float64(x), np.array([x]), np.float32(x)):
+            assert np.ravel(function(operand)) == pytest.approx([expected(x)], rel=1e-6)
+        if x == int(x):
+            assert function(int(x)) == pytest.approx(expected(x))
+        for kind in (ca.SX, ca.MX):
+            symbol = kind.sym("x")
+            assert float(ca.Function("f", [symbol], [function(symbol)])(x)) == pytest.approx(expected(x))
+
+
+def test_arrays_are_taken_element_by_element() -> None:
+    x = np.array([[0.0, 2.0], [4.0, np.inf]])
+    assert clipped(x, 1.0, 3.0).tolist() == [[1.0, 2.0], [3.0, 3.0]]
+    assert greatest(np.array([np.nan, 1.0]), 0.0).tolist() == [0.0, 1.0], "what is no number counts as nothing"
+
+
+# A preference that a user writes
+
+
+@dataclass(frozen=True)
+class Quick(Preference):
+    """The least effort within a time, which is a limit without a name."""
+
+    time: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return "time", "effort"
+
+    def stages(self, goals: Sequence[Objective], ranges: object) -> tuple[Stage, ...]:
+        return (Stage("effort", lambda J, peaks: J[1], limits=lambda J: [J[0] - self.time]),)
+
+    def degrees(self, goals: Sequence[Objective], ranges: object, objectives: np.ndarray) -> np.ndarray:
+        return np.full(objectives.shape, np.nan)
+
+
+def test_the_best_is_the_least_effort_within_the_time() -> None:
+    """The efforts of times from 1.2 to 4 are 12 / T^3."""
+    ranking = Quick(2.6).rank(cart(3))
+    assert ranking.best.objectives["time"] == pytest.approx(2.6) and ranking.message == ""
+    assert ranking.values[ranking.order].tolist() == pytest.approx([12 / 2.6**3, 12 / 1.2**3, np.inf])
+
+
+def test_limits_without_names_are_told_by_their_numbers_where_no_point_meets_them() -> None:
+    ranking = Quick(1.0).rank(cart(3))
+    assert ranking.message == "No point meets all hard limits; none has limit 1 of effort."
+    assert ranking.best.objectives["time"] == pytest.approx(1.2)

@@ -127,52 +127,6 @@ def test_levels_of_priority_are_stages() -> None:
     assert stages(GoalProgramming({"a": 4.0}, priorities=["a"])) == [("deviations", False), ("sum of all", True)]
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: GoalProgramming({"a": Around(2.0, 0.1)}), "goal programming has no tolerances: give 'a' the target Around(2)"),
-        (lambda: GoalProgramming({"a": 1.0, "b": 1.0}, {"c": 1.0}), "'c' has a weight but no target; there are targets of a, b"),
-        (lambda: GoalProgramming({"a": 1.0, "b": 1.0}, None, ["a", "c"]), "'c' has a priority but no target; there are targets of a, b"),
-        (lambda: GoalProgramming({"a": 1.0, "b": 1.0}, None, ["a"]), "'b' has a target but no priority"),
-        (lambda: GoalProgramming({"a": "x"}), "the target of 'a' must be a number"),
-        (lambda: GoalProgramming(3), "the targets must be a dict by name of objectives"),  # type: ignore[arg-type]
-        (lambda: Around("x"), "the value of Around must be a number"),  # type: ignore[arg-type]
-        (lambda: Around(1.0, "12"), "the tolerance of Around must be a number"),  # type: ignore[arg-type]
-        (lambda: Around(1.0, (-1.0, 2.0)), "the tolerance of Around below must be positive"),
-        (lambda: Around(1.0, (1.0, -2.0)), "the tolerance of Around above must be positive"),
-        (lambda: Around(1.0, (1.0,)), "the tolerance of Around must be a number or a pair (below, above), not (1.0,)"),  # type: ignore[arg-type]
-        (lambda: FuzzyGoal({"a": 1.0}, {"b": 1.0}), "'b' has a tolerance but no target; there are targets of a"),
-        (lambda: FuzzyGoal({"a": 1.0}, {}), "tolerances must be a dict by name"),
-        (lambda: FuzzyGoal({"a": Around(1.0)}, {"a": 1.0}), "the tolerance of 'a' belongs into its target: Around(value, tolerance)"),
-        (lambda: FuzzyGoal({"a": 1.0}, {"a": 0.0}), "the tolerance of 'a' must be positive"),
-        (lambda: FuzzyGoal({"a": 1.0}, aggregate="max"), "aggregate must be 'min' or 'sum'"),
-        (lambda: FuzzySatisfactory({}, [("a", "b")]), "priorities must have at least two levels: what is most important, and"),
-        (lambda: FuzzySatisfactory({"c": 1.0}, ["a", "b"]), "'c' has a target but no priority"),
-        (lambda: FuzzySatisfactory({}, ["a", "b"], -1.0), "regulating must be in [0, inf)"),
-        (lambda: FuzzySatisfactory(3, ["a", "b"]), "the targets must be a dict by name"),  # type: ignore[arg-type]
-        (lambda: FuzzySatisfactory({}, ["a", "b"], ordered=1), "ordered must be True or False, not 1"),  # type: ignore[arg-type]
-        (lambda: ReferencePoint({"a": "x"}), "the aspiration of 'a' must be a number"),  # type: ignore[dict-item]
-        (lambda: ReferencePoint({"a": 1.0}, {"a": "x"}), "the reservation of 'a' must be a number"),  # type: ignore[dict-item]
-        (lambda: ReferencePoint({"a": 1.0}, augmentation=1.1), "augmentation must be in [0, 1]"),
-        (lambda: Nimbus({"a": "x"}, improve=["a"]), "the current value of 'a' must be a number"),  # type: ignore[dict-item]
-        (lambda: Nimbus({"a": 1.0}, improve="a"), "improve must be a list of names"),
-        (lambda: Nimbus({"a": 1.0}, keep="a"), "keep must be a list of names"),
-        (lambda: Nimbus({"a": 1.0}, free="a"), "free must be a list of names"),
-        (lambda: Nimbus({"a": 1.0}, to=[1.0]), "'to' must be a dict by name"),  # type: ignore[arg-type]
-        (lambda: Nimbus({"a": 1.0}, until=[1.0]), "'until' must be a dict by name"),  # type: ignore[arg-type]
-        (lambda: Nimbus({"a": 1.0}, improve=["a"], until={"b": 1.0}, augmentation=-0.1), "augmentation must be in [0, 1]"),
-        (lambda: Nimbus({"a": 1.0}, improve=["a"], keep=["b"]), "Nimbus needs an objective that may become worse, in `until` or `free`"),
-        (lambda: Nimbus({"a": 1.0}, keep=["a"], free=["b"]), "Nimbus needs an objective that is to become better, in `improve` or `to`"),
-        (lambda: Nimbus({"a": 1.0}, improve=["a"], free=["b"], enough=1), "enough must be True or False, not 1"),  # type: ignore[arg-type]
-        (lambda: WeightedSum({"a": -1.0}), "weights of 'a' must not be negative, not -1"),
-    ],
-)
-def test_what_makes_no_sense_is_named_at_once(make: Any, words: str) -> None:
-    with pytest.raises(ValueError) as caught:
-        make()
-    assert str(caught.value).startswith(words)
-
-
 # Fuzzy goals
 
 
