@@ -16,7 +16,6 @@ from ..fronts.points import Points
 from ..io.text import label
 from ..preferences import Preference, Ranges
 from ..preferences.pictures import draw_degrees
-from .choice import Choice
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -161,7 +160,7 @@ def draw_history(
     goals: Sequence[Objective],
     ranges: Ranges,
     asked: Sequence[str],
-    choices: Sequence[Choice],
+    choices: Sequence[Any],
     by: Preference | None = None,
     figure: Any = None,
 ) -> Sequence[Axes]:
