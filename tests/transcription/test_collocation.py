@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import runpy
+from pathlib import Path
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -10,9 +14,10 @@ from gauss import integrate
 from numpy.polynomial import Polynomial, legendre
 from scipy.integrate import solve_ivp
 
-from macs import optimize, payoff
+from macs import Front, optimize, payoff
 from problems import Problem, load
-from transcription import Collocation, from_dict
+from problems.cases.standard import published
+from transcription import Collocation
 from transcription.elements.tables import POINTS, collocation_tables, control_degree
 from transcription.meshes.minimum import OptimumMultipliers
 from transcription.nlp.scalarized import scalarize
@@ -256,12 +261,6 @@ def test_costates_of_a_nonlinear_problem_are_those_of_the_closed_form(method):
     assert len(costates.edges) == method.intervals + 1
 
 
-@pytest.mark.parametrize("points", ["lobatto", "chebyshev"])
-def test_points_without_a_covector_mapping_have_no_costates(points):
-    nlp = Collocation(2, 3, points=points).nlp(rise().compile())
-    assert nlp.costates(np.zeros(len(nlp.variables)), np.zeros(len(nlp.g_lower))) == {}
-
-
 # What a user states
 
 
@@ -330,17 +329,6 @@ def test_meshes_are_refined_until_a_simulation_agrees(points):
     assert refined.objectives["cost"] == pytest.approx(2.8672610452, rel=1e-6), "by the maximum principle"
 
 
-@pytest.mark.slow
-def test_edges_move_to_the_switches():
-    """Minimum time of the ascent is bang-bang, in closed form 109.10894511799619."""
-    coarse = optimize(load("goddard"), Collocation(4, 4), objective="flight time", verify=None, starts=1)
-    (point,) = coarse.alone().refine_mesh(tolerance=1e-8)
-    assert from_dict(point.transcription).mesh_of("ascent").moving and point.simulate().max_defect < 1e-8
-    # As accurate as it is asked to be: IPOPT's barrier leaves controls 1e-5 off their bounds, how far differs between machines. Meshes
-    # whose edges stay end 2e-5 away.
-    assert point.objectives["flight time"] == pytest.approx(109.10894511799619, rel=1e-8)
-
-
 def test_interpolation_of_polynomials_is_exact():
     p = Polynomial([0.3, -0.2, 0.2])
     for points in POINTS:
@@ -356,3 +344,39 @@ def test_interpolation_of_polynomials_is_exact():
         assert flown.at(t)["u"] == pytest.approx(p(t), abs=1e-13)
         assert flown.at(t)["x"] == pytest.approx(p.integ()(t), abs=1e-13)
         assert nlp.interpolate(nlp.unpack(z)) == pytest.approx(z, abs=1e-12)
+
+
+RADAU = {
+    "delta_iii": (7529.7123, 0.01, "GPOPS (Rao et al., ACM TOMS 37(2), 2010): 7529.712412 kg; YAPSS, Legendre-Gauss-Radau: 7529.712287"),
+    "tumour": (7571.67158, 0.02, "CGPOPS (Agamawi and Rao, ACM TOMS 46(3), 2020), by Radau collocation: 7571.67158"),
+    "dynamic_soaring": (0.06358656, 1e-6, "YAPSS 0.2.3, with the data of GPOPS-II (Patterson and Rao, ACM TOMS 41(1), 2014)"),
+    "hypersensitive": (1.330806904943, 1e-6, "closed form; the first example of GPOPS-II (Patterson and Rao 2014), which draws it"),
+}
+"""Optima of programs that collocate at Radau points, how near ours have to be, and where they are printed."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RADAU)
+def test_radau_reproduces_published_optima_of_radau_collocation(name):
+    value, within, _ = RADAU[name]
+    record = published(name)[0]
+    mesh = Collocation(5, 5) if name == "delta_iii" else Collocation(20, 4)
+    found = Front.of(optimize(load(f"standard/{name}"), mesh, verify=None, starts=1).alone())
+    (point,) = found.refine_mesh(tolerance=1e-6).verify(1e-3)
+    assert point.verified and point.objectives[record.objective] == pytest.approx(value, abs=within)
+    assert record.met(point.objectives[record.objective])
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "convergence.py"
+
+
+@pytest.mark.slow
+def test_the_page_of_convergence_shows_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page: dict[str, Any] = runpy.run_path(str(PAGE))
+    page["main"].__globals__["TARGET"] = tmp_path / "convergence.png"
+    page["main"]()
+    assert (tmp_path / "convergence.png").stat().st_size > 10_000 and "convergence.png" in capsys.readouterr().out
+    for points in ("gauss", "radau", "lobatto"):
+        found = {n: page["errors"](method)[0] for n, method in page["families"]()[points] if n <= 10}
+        # Of a power of n, it would be the seventh or more.
+        assert found[10] < 1e-9 and found[4] > 1e-6, points

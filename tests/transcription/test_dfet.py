@@ -1,13 +1,18 @@
+"""DFET on elements of any lengths, each phase with its own."""
+
 from __future__ import annotations
+
+from math import pi, tan
 
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, integrator, oscillator, oscillator_rates, propagated, slot
+from cases import decay, integrator, oscillator, oscillator_rates, propagated, slot
 from gauss import integrate
 
-from problems import load
-from transcription import DFET
+from problems import Problem, load
+from transcription import DFET, parse
+from transcription.nlp.scalarized import scalarize
 
 
 def sizes(nlp) -> tuple[int, int]:
@@ -67,23 +72,6 @@ def test_boundary_values_converge_with_order_2l_plus_2(basis, order):
 # Derivatives and shapes
 
 
-def test_batches_are_rows():
-    nlp = DFET(2, 3).transcribe(oscillator())
-    Z = propagated(nlp, k=4)
-    F, violation = nlp.evaluate(Z)
-    assert F.shape == (4, 2) and violation.shape == (4,)
-    for i in range(4):
-        one, worst = nlp.evaluate(Z[i : i + 1])
-        assert np.array_equal(one[0], F[i]) and worst[0] == violation[i]
-    assert np.array_equal(nlp.propagate(Z), Z) or np.abs(nlp.propagate(Z) - Z).max() < 1e-12
-    C = candidates(nlp, 4)
-    before = C.copy()
-    first = nlp.first_guess(C)
-    assert np.array_equal(C, before) and np.array_equal(first[:, nlp.free], C)
-    assert ((first >= nlp.lower) & (first <= nlp.upper)).all()
-    assert np.array_equal(nlp.propagate(first)[:, nlp.free], C)
-
-
 def test_violations_name_what_is_violated():
     problem, phase = integrator(final=1)
     phase.path("gate", phase["x"], upper=0.5)
@@ -133,19 +121,6 @@ def test_path_constraints_are_imposed_at_ends_and_nodes():
     assert nlp.unpack(z)["run"]["gate"] == pytest.approx(2 * times)
 
 
-@pytest.mark.parametrize(
-    "method", [DFET(3, 3, control_order=0), DFET(2, 1, control_order=4), DFET(1, 0), DFET(3, 2, control_order=5, basis="bernstein")]
-)
-def test_controls_may_have_another_order_than_states(method):
-    nlp = method.transcribe(oscillator())
-    assert len(nlp.free) == 4 + 2 * method.elements * (method.degree_of_controls(method.order) + 1) - 0
-    Z = propagated(nlp)
-    assert nlp.evaluate(Z)[1].max() < 1e-12
-    phase = nlp.unpack(Z[0])["swing"]
-    assert phase.control.coefficients.shape == (method.elements, method.degree_of_controls(method.order) + 1, 2)
-    assert (np.diff(phase.time) > 0).all()
-
-
 # Data
 
 
@@ -165,3 +140,52 @@ def test_tables_are_looked_up(kind):
     F, violation = nlp.evaluate(Z)
     assert F[0, 1] == pytest.approx(exact, rel=2e-3 if kind == "linear" else 1e-5)
     assert violation[0] < 1e-12
+
+
+UNEVEN = (0.0, 0.1, 0.35, 0.9, 1.0)
+
+
+@pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
+@pytest.mark.parametrize("order", [0, 1, 4])
+def test_uneven_elements_are_the_gauss_method_too(basis, order):
+    nlp = DFET(1, 1, basis=basis, mesh={"swing": (UNEVEN, order)}).transcribe(oscillator())
+    for z, worst in zip(propagated(nlp, k=2), nlp.evaluate(propagated(nlp, k=2))[1], strict=True):
+        flight = nlp.unpack(z)
+        phase = flight["swing"]
+        assert np.allclose((phase.state.edges - phase.t0) / (phase.tf - phase.t0), UNEVEN, atol=1e-15)
+        edges, _ = integrate(rates_of(flight, flight.parameters["m"]), phase.states[0], phase.state.edges, order + 1)
+        assert np.abs(phase.edge_states - edges).max() < 1e-12 * max(1, np.abs(edges).max())
+        assert worst < 1e-13
+
+
+def closed_curve() -> Problem:
+    """The largest area that a curve of length 1 encloses: that of a circle, 1 / (4 pi)."""
+    problem = Problem("closed curve")
+    curve = problem.phase("curve", t0=0, tf=1)
+    x, y = (curve.state(name, bounds=(-1, 1)) for name in "xy")
+    u, v = (curve.control(name, bounds=(-2, 2)) for name in "uv")
+    curve.dynamics(x=u, y=v)
+    curve.path("unit speed", u**2 + v**2, lower=1, upper=1)
+    for name, state in (("x", x), ("y", y)):
+        problem.constraint(f"closed in {name}", curve.final(state) - curve.initial(state), lower=0, upper=0)
+        problem.constraint(f"centre in {name}", curve.integral(state), lower=0, upper=0)
+    corners = [0.0, 0.25, 0.5, 0.75, 1.0]
+    curve.guess(x=(corners, [0.125, 0.125, -0.125, -0.125, 0.125]), y=(corners, [0.125, -0.125, -0.125, 0.125, 0.125]), u=0.0, v=0.0)
+    problem.maximize("area", curve.integral((y * u - x * v) / 2))
+    return problem
+
+
+CIRCLE, POLYGON = 1 / (4 * pi), 1 / (80 * tan(pi / 20))
+"""The areas of a circle, and of a regular polygon of 20 sides, whose perimeter is 1."""
+
+
+@pytest.mark.parametrize(
+    ("word", "area", "miss"),
+    [("dfet:10x4", CIRCLE, 1e-8), ("dfet:20x3:bernstein:1", CIRCLE, 3e-5), ("dfet:20x2:bernstein:0", POLYGON, 1e-8)],
+)
+def test_a_closed_curve_of_unit_speed_encloses_a_circle(word: str, area: float, miss: float) -> None:
+    nlp = parse(word).nlp(closed_curve())
+    middle = np.where(np.isnan(nlp.guess), 0.5 * (nlp.lower + nlp.upper)[nlp.free], nlp.guess)
+    solved = scalarize(nlp, nlp.first_guess(middle[None])[0], reference=np.zeros(1), weights=np.ones(1))
+    assert solved.status == "converged" and solved.violation < 1e-6
+    assert abs(-solved.F[0] / area - 1) < miss

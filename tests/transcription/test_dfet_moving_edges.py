@@ -89,25 +89,6 @@ def test_a_mesh_is_found_in_trajectories_of_its_own_only():
         assert mesh.found_in(edges) is mesh
 
 
-def test_a_settled_method_begins_where_the_edges_of_a_trajectory_are():
-    method = moving()
-    nlp = method.transcribe(oscillator())
-    (z,) = propagated(nlp, k=1)
-    flight = nlp.unpack(z)
-    settled = method.settled(flight)
-    mesh = settled.mesh_of("swing")
-    assert mesh.moving == MOVING and mesh.order == 3
-    assert mesh.edges[2] == pytest.approx(0.5 * (mesh.edges[1] + mesh.edges[3]), abs=1e-15)
-    assert [mesh.edges[j] for j in MOVING] == pytest.approx([z[slot(nlp, f"swing.edge[{j}]")] for j in MOVING], abs=1e-12)
-    again = settled.transcribe(oscillator())
-    assert again.evaluate(again.interpolate(flight)[None])[1] < 1e-10
-    assert settled.settled(again.unpack(again.interpolate(flight))).mesh_of("swing").edges == pytest.approx(mesh.edges, abs=1e-12)
-    # Not from a trajectory of another mesh, and not where nothing moves.
-    other = DFET(5, 3).transcribe(oscillator())
-    assert method.settled(other.unpack(propagated(other, k=1)[0])) == method
-    assert DFET(5, 3).settled(flight) == DFET(5, 3)
-
-
 def least_time() -> Problem:
     """A double integrator from rest at 0 to rest at 1 and back at -0.5, as fast as may be, with unequal bounds of the force.
 

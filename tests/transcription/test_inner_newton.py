@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from problems import Problem, load
 from transcription import DFET
-from transcription.inner import Ipopt, Newton, Projection
+from transcription.inner import Newton
 from transcription.inner.least_distance import least_distance
 
 
@@ -81,21 +81,6 @@ def test_what_propagation_leaves_is_what_the_nlp_says():
 
 
 @pytest.mark.slow
-def test_warm_solves_agree_with_the_projection():
-    nlp = DFET(4, 6).transcribe(load("goddard"))
-    W = Ipopt().solve(nlp, candidates(nlp, 20)).z
-    rng = np.random.default_rng(1)
-    low, high, span = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.span[nlp.free]
-    near = np.clip(W[:, nlp.free] + 0.05 * span * rng.standard_normal((20, len(span))), low, high)
-    fast, exact = Newton().solve(nlp, near, W), Ipopt().solve(nlp, near, W, tolerance=1e-11)
-    assert set(fast.status) == {"converged"} and fast.iterations.mean() < 8
-    assert np.abs((fast.F - exact.F) / np.ptp(exact.F, axis=0)).max() < 1e-5
-    assert (fast.moved <= 1.001 * exact.moved + 1e-9).all() and fast.moved.mean() < 0.07
-    auto = Projection().solve(nlp, near, W)
-    assert auto.fallbacks == 0 and np.array_equal(auto.z, fast.z)
-
-
-@pytest.mark.slow
 @pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
 def test_compiled_functions_give_the_same_bits(monkeypatch):
     problem = load("goddard")
@@ -107,18 +92,6 @@ def test_compiled_functions_give_the_same_bits(monkeypatch):
     for _ in range(2):
         found = Newton().solve(nlp, C)
         assert np.array_equal(found.z, expected.z) and np.array_equal(found.iterations, expected.iterations)
-
-
-def test_nothing_infeasible_is_called_feasible():
-    problem = Problem("impossible")
-    phase = problem.phase("p", t0=0.0, tf=1.0)
-    x = phase.state("x", bounds=(-10, 10), initial=0.0, final=5.0)
-    u = phase.control("u", bounds=(-1, 1))
-    phase.dynamics(x=u)
-    problem.minimize("end", phase.integral(u * x))
-    nlp = DFET(2, 2).transcribe(problem)
-    found = Projection().solve(nlp, candidates(nlp, 3))
-    assert set(found.status) == {"infeasible"} and found.violation.min() > 0.1 and found.fallbacks == 3
 
 
 @settings(max_examples=60, deadline=None)

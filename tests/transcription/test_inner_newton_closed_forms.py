@@ -63,14 +63,6 @@ def test_a_bound_keeps_the_nearest_point_where_it_is() -> None:
     assert x == pytest.approx(np.array([[-1.0, -2.0], [1 / 3, 2.0]]), abs=1e-9) and set(found.status) == {"converged"}
 
 
-@pytest.mark.parametrize("sides", [{"lower": 1.0}, {"lower": 1.0, "upper": 1.5}])
-def test_an_inequality_that_holds_moves_nothing(sides: dict[str, float]) -> None:
-    nlp = plane(lambda p, q: [(p + q, sides)])
-    x, found = solve(nlp, [[0.2, 0.3], [1.0, 0.2], [0.5, 0.5]])
-    assert x == pytest.approx(np.array([[0.45, 0.55], [1.0, 0.2], [0.5, 0.5]]), abs=1e-9)
-    assert found.iterations[1:].tolist() == [1, 1] and found.moved[1:].max() < 1e-15 and set(found.status) == {"converged"}
-
-
 @pytest.mark.parametrize("radius", [1.0, 0.1, 0.01])
 def test_the_nearest_point_of_a_circle(radius: float) -> None:
     """However much its curvature makes the plain steps diverge: from afar, in radii, they overshoot more the farther it is."""
@@ -219,22 +211,3 @@ def test_linear_iterations_end_once_all_directions_are_known(d: int, size: float
     assert points[1] == pytest.approx(plain, rel=1e-12), "the first step is the plain one"
     assert np.abs(points[d] - root).max() > 1e-3 * size
     assert points[d + 1] == pytest.approx(root, abs=1e-5 * size) and points[-1] == pytest.approx(root, abs=1e-8 * size)
-
-
-def test_iterations_that_are_not_good_begin_anew_and_others_go_on() -> None:
-    def s(x: np.ndarray) -> np.ndarray:
-        return 2 - x**2
-
-    both, alone, fresh = Anderson(2, 1, 3), Anderson(1, 1, 3), Anderson(1, 1, 3)
-    x, y = np.array([[1.0], [1.2]]), np.array([[1.0]])
-    for iteration in range(7):
-        good = np.array([True, iteration != 3])
-        step = both.improve(x, s(x), good)
-        single = alone.improve(y, s(y), np.ones(1, dtype=bool))
-        assert step[0] == pytest.approx(single[0], abs=1e-12)
-        if iteration == 3:
-            assert step[1] == pytest.approx(s(x)[1]), "the plain one"
-        elif iteration > 3:
-            assert step[1] == pytest.approx(fresh.improve(x[1:], s(x[1:]), np.ones(1, dtype=bool))[0], abs=1e-12)
-        # Small steps, so that all of them say something.
-        x, y = x + 0.3 * step, y + 0.3 * single

@@ -101,16 +101,6 @@ def test_what_a_mesh_is_too_coarse_for_is_seen_measured_and_found():
     assert after.gain < 0.05 * verdict.gain
 
 
-def test_where_a_limit_is_reached_nothing_is_said():
-    """Below a ceiling, least effort: at the ceiling its multiplier belongs to the Hamiltonian."""
-    problem = rest_to_rest()
-    run = problem.phases["run"]
-    run.path("ceiling", run["v"], upper=1.2)
-    _, trajectory, _, verdict = optimum(problem, DFET(12, 3, basis="bernstein"))
-    speed = trajectory["run"].state.on_elements(np.array([0.0]))[:, 0, 1]
-    assert (verdict.gains["run"].amounts[np.abs(speed - 1.2) < 1e-4] == 0.0).all() and (np.abs(speed - 1.2) < 1e-4).sum() >= 4
-
-
 @pytest.mark.parametrize("method", [DFET(4, 3), Collocation(4, 4, points="gauss"), Collocation(4, 4)], ids=str)
 def test_a_constraint_on_an_integral_has_its_share_in_the_hamiltonian(method):
     """Furthest in one second from rest with a given effort: x'' = u, integral u^2 = 3; u = 3 (1 - t), final x = 1."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from smooth_problems import nlp_of, shuttle, slide, still, two_wells, vector
+from smooth_problems import nlp_of, shuttle, slide, two_wells, vector
 
 from problems import load
 from transcription import DFET, NLP
@@ -88,15 +88,6 @@ def test_equations_that_say_the_same_twice() -> None:
     assert at(nlp, p=1.3, q=0.5) == pytest.approx(2 * 0.3 * SPAN, rel=1e-6)
 
 
-def test_one_objective_is_the_plain_condition() -> None:
-    problem = still("one")
-    p = problem.parameter("p", bounds=(0, 2))
-    problem.maximize("f", p - p**2 / 2)
-    nlp = nlp_of(problem)
-    assert at(nlp, p=1.0) == pytest.approx(0, abs=1e-12)
-    assert at(nlp, p=0.5) == pytest.approx(0.5 * 2)
-
-
 def test_the_states_are_eliminated_by_their_adjoint() -> None:
     nlp = nlp_of(slide())
     for c in (0.05, 0.25, 0.5):
@@ -135,15 +126,6 @@ def test_small_on_the_front_and_large_off_it(name: str) -> None:
     moved = z[nlp.free] + 0.05 * nlp.span[nlp.free] * rng.normal(size=len(nlp.free))
     again = inner_solver("auto").solve(nlp, np.clip(moved, nlp.lower[nlp.free], nlp.upper[nlp.free])[None], z[None])
     assert again.status[0] == "converged" and optimality(nlp, again.z[0], ranges) > 1e-3
-
-
-def test_along_an_active_path_constraint() -> None:
-    nlp = nlp_of(slide(limit=0.5))
-    z = scalarize(nlp, vector(nlp, u=0.1), reference=np.array([np.inf, 0.0]), weights=np.ones(2)).z
-    assert nlp.unpack(z)["run"]["wall"].max() == pytest.approx(0.5, abs=1e-6)
-    assert optimality(nlp, z, np.array([2.0, 1.4])) < 1e-6
-    other = vector(nlp, u=0.2)
-    assert nlp.evaluate(other[None])[1][0] <= 1e-6 and optimality(nlp, other, np.array([2.0, 1.4])) > 1e-2
 
 
 def test_peaks_have_the_multipliers_of_their_samples() -> None:

@@ -146,14 +146,6 @@ def test_weights_of_two_objectives() -> None:
     assert multipliers.of_objectives[1] / multipliers.of_objectives[0] == pytest.approx(0.2 / 0.8, rel=1e-5)
 
 
-def test_an_objective_left_out_has_no_weight() -> None:
-    nlp = nlp_of(two_wells(), SMALLEST)
-    z = vector(nlp, p=0.5, q=0.0)
-    for scales, alone in (([np.inf, 4.0], [0, 0.25]), ([4.0, np.inf], [0.25, 0])):
-        assert found(nlp, z, scales).of_objectives == pytest.approx(alone)
-        assert optimality(nlp, z, np.array(scales)) == pytest.approx(2 * 0.5 * 4 / 4)
-
-
 def test_a_mixture_has_what_its_best_weights_leave() -> None:
     nlp = nlp_of(two_wells(q=(0.5, 2.0)), SMALLEST)
     s = 0.003 / 1.5

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.sparse import csr_matrix, diags, identity
+from scipy.sparse import csr_matrix, diags
 from smooth_problems import nlp_of, still, vector
 
 from problems import Problem
@@ -121,16 +121,3 @@ def test_the_steepest_direction_does_not_depend_on_the_size_of_equations_or_grad
     s, multipliers = steepest(metric, equations, gradients)
     assert s / size == pytest.approx(np.array([[1 / 3, 0], [-1 / 3, 0], [0, 5]]), rel=1e-7, abs=1e-7)
     assert multipliers / size * small == pytest.approx(np.array([[2 / 3, 0]]), rel=1e-7)
-
-
-def test_equations_that_follow_from_others_change_nothing() -> None:
-    gradients = np.array([[1.0, 0.0, 0.0], [1.0, 2.0, 3.0]])
-    one, twice = csr_matrix([[1.0, 1.0, 0.0]]), csr_matrix([[1.0, 1.0, 0.0], [3.0, 3.0, 0.0], [0.0, 0.0, 0.0]])
-    (s, _), (t, multipliers) = (steepest(identity(3), rows, gradients) for rows in (one, twice))
-    assert t == pytest.approx(s, abs=1e-9) and s == pytest.approx(np.array([[0.5, -0.5], [-0.5, 0.5], [0, 3]]), abs=1e-9)
-    assert twice.T @ multipliers == pytest.approx(gradients.T - t, abs=1e-9)
-
-
-def test_a_metric_of_nothing_is_refused() -> None:
-    with pytest.raises(RuntimeError):
-        steepest(diags([1.0, 0.0]), csr_matrix([[1.0, 0.0]]), np.ones((1, 2)))

@@ -81,13 +81,6 @@ def test_smoothing_keeps_the_variance_and_a_short_length_everything() -> None:
     assert smoothing(places, 1e4) == pytest.approx(np.full((4, 4), 0.5))
 
 
-def test_without_a_guess_they_vary_about_the_middle() -> None:
-    problem = climb()
-    nlp = DFET(5, 2).transcribe(problem)
-    X = Smooth(spread=0.05).draw(problem, DFET(5, 2), 2000, np.random.default_rng(0))
-    assert X[:, columns(nlp, "throttle")].mean(axis=0) == pytest.approx(1, abs=0.02)
-
-
 @pytest.mark.parametrize("settings", [{"spread": 0}, {"spread": 1.5}, {"length": -1}, {"length": "long"}, {"spread": True}, {"guess": 1}])
 def test_settings_that_make_no_sense(settings) -> None:
     with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be"):

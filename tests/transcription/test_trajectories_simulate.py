@@ -5,7 +5,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, integrator, oscillator, propagated, solved
+from cases import candidates, decay, integrator, oscillator, solved
 
 from problems import Problem, load
 from transcription import DFET, PiecewisePolynomial, Trajectory
@@ -40,17 +40,6 @@ def test_a_flight_without_controls_has_its_closed_form(method):
     assert check.objectives == pytest.approx(exact, rel=1e-5)
     assert check.trajectory["fall"].at(0.7)["x"] == pytest.approx(np.exp(-0.7), rel=1e-5)
     assert check.max_defect < 1e-6 and check.violation < 1e-9
-
-
-def test_the_defect_is_that_of_the_mesh():
-    problem, _phase = decay(tf=2.0)
-    nlp = DFET(2, 0).transcribe(problem)
-    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.empty((1, 0))))[0])
-    check = simulate(nlp.problem, flight)
-    error = np.abs(flight["fall"].edge_states[:, 0] - np.exp(-flight["fall"].state.edges)).max()
-    assert error > 0.02
-    assert check.defect == {"fall": {"x": pytest.approx(error / 4, rel=1e-6)}}, "in spans of the bounds"
-    assert check.max_defect == check.defect["fall"]["x"]
 
 
 @pytest.mark.parametrize("element", [0, 2])
@@ -139,22 +128,6 @@ def test_a_phase_of_no_duration_is_simulated():
     nlp = DFET(2, 2).transcribe(problem)
     check = simulated(nlp, nlp.propagate(nlp.first_guess(np.array([[2.0, 2.0]])))[0])
     assert check.max_defect < 1e-12 and check.violation == 0 and check.objectives["end"] == pytest.approx(2)
-
-
-def test_a_phase_that_ends_before_it_begins_by_a_tolerance_has_its_values():
-    problem, phase = integrator()
-    problem.minimize("end", phase.final(phase["x"]))
-    nlp = DFET(2, 2).transcribe(problem)
-    whole = nlp.unpack(propagated(nlp)[0])[phase.name]
-    edges = np.array([2.0, 2.0 - 3e-8, 2.0 - 6e-8])
-    short = replace(
-        whole,
-        state=PiecewisePolynomial(edges, np.full_like(whole.state.coefficients, 0.5), whole.state.basis),
-        control=PiecewisePolynomial(edges, whole.control.coefficients, whole.control.basis),
-    )
-    assert short.tf < short.t0 and all(short.at(time)["x"] == pytest.approx(0.5) for time in (short.t0, short.tf))
-    with pytest.raises(ValueError, match="asked for"):
-        short.at(2.1)
 
 
 # Trouble
@@ -249,22 +222,6 @@ def test_bernstein_does_not_overshoot():
 # Several at once
 
 
-def bursting() -> Problem:
-    """x' = x^2: beyond all bounds at t = 1 / x(0)."""
-    problem = Problem("bursting")
-    phase = problem.phase("fall", t0=0.0, tf=(0.5, 2.0))
-    x = phase.state("x", bounds=(0, 100), initial=(0.1, 1.0))
-    phase.dynamics(x=x**2)
-    problem.minimize("area", phase.integral(x))
-    return problem
-
-
-def planned(nlp, x0: float, tf: float) -> Trajectory:
-    """A flight of `bursting`, as the transcription has it."""
-    C = [[tf if nlp.variables[i].name == "fall.tf" else x0 for i in nlp.free]]
-    return nlp.unpack(nlp.propagate(nlp.first_guess(np.array(C)))[0])
-
-
 @pytest.mark.slow
 def test_several_are_simulated_as_each_is_alone():
     nlp = DFET(4, 4).transcribe(oscillator())
@@ -278,18 +235,6 @@ def test_several_are_simulated_as_each_is_alone():
         assert check.objectives == pytest.approx(alone.objectives, rel=1e-8)
         assert check.violations == pytest.approx(alone.violations, abs=1e-8)
         np.testing.assert_allclose(check.trajectory["swing"].states, alone.trajectory["swing"].states, atol=1e-8)
-
-
-@pytest.mark.slow
-def test_one_that_breaks_down_takes_no_other_with_it():
-    nlp = DFET(2, 3).transcribe(bursting())
-    cases = [(0.2, 2.0), (1.0, 1.8), (0.5, 1.0), (0.9, 2.0), (0.3, 1.5)]
-    checks = simulate_all(nlp.problem, [planned(nlp, *case) for case in cases])
-    for (x0, tf), check in zip(cases, checks, strict=True):
-        if x0 * tf < 1:
-            assert check.objectives["area"] == pytest.approx(-np.log(1 - x0 * tf), rel=1e-7)
-        else:
-            assert not np.isfinite(check.objectives["area"]) and check.max_defect == np.inf and check.violation == np.inf
 
 
 @pytest.mark.parametrize("place", [0.137, 0.51, 0.866])
