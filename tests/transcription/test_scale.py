@@ -41,7 +41,7 @@ def test_instructions_and_variables_grow_with_the_mesh(word):
         assert power([count(nlp) for nlp in nlps]) < ASKED
 
 
-@pytest.mark.parametrize("word", [*SPARSE[:-1], pytest.param(SPARSE[-1], marks=pytest.mark.slow)])
+@pytest.mark.parametrize("word", SPARSE[:-1])
 def test_derivatives_grow_with_the_mesh(word):
     nlps = [parse(word.format(n)).transcribe(load("goddard")) for n in (50, 100, 200)]
     for entries in (
