@@ -24,7 +24,7 @@ from ..fronts.points import Points
 from ..io.atomic import read_whole, write_whole
 
 FORMAT, FILE_VERSION = "macs dialogue", 1
-MOST_BYTES = 2 * files.LARGEST
+MOST_BYTES = 2 * files.LARGEST_FRONT
 """Bytes that a file may have."""
 
 

@@ -19,7 +19,7 @@ from transcription.meshed import Meshed
 from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import OPTIMAL, certified, from_vectors, nearest_violation
+from ..fronts.builders import CERTIFIED, certified, from_vectors, nearest_violation
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
@@ -185,7 +185,7 @@ class DecisionSolver:
                 amounts = exceeded(limits, goals, confirmed[0])
                 said.append(f"no point that one confirms is within the hard limits: of the nearest, {amounts}")
         said += [words for words in (ONLY_NEAR, NO_OPTIMUM) if words in chosen.note]
-        if is_new and not message and (chosen.optimality or 0.0) > OPTIMAL:
+        if is_new and not message and (chosen.optimality or 0.0) > CERTIFIED:
             why = f", since it is {KEPT_INSIDE}" if KEPT_INSIDE in chosen.note else ""
             said.append(f"{self._not_optimal(chosen.optimality or 0.0)}{why}")
         return said

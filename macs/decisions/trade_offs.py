@@ -22,7 +22,7 @@ from transcription import from_dict
 from transcription.nlp.optimality import ratio_bounds, ratio_residual
 from transcription.nlp.projection import TangentProjection, projection
 
-from ..fronts.builders import OPTIMAL
+from ..fronts.builders import CERTIFIED
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..io.text import text_table
@@ -224,7 +224,7 @@ class TradeOffs:
         """What the projection says of the point: that it is not Pareto-optimal, which objectives can get better together with all others,
         and which can get no better along what is active; or why there is none. And whether weights that differ do as well, see `bounds`."""
         violation = self.point.violation
-        found = [] if violation <= OPTIMAL else [f"not feasible: the violation is {violation:.1e}"]
+        found = [] if violation <= CERTIFIED else [f"not feasible: the violation is {violation:.1e}"]
         try:
             found += [f"not Pareto-optimal: {self._not_optimal}"] if self.left > NO_GRADIENT else []
         except ValueError as reason:

@@ -28,14 +28,8 @@ from .point import Point
 from .points import Points
 from .provenance import merged_stats
 
-OPTIMAL = 1e-3
+CERTIFIED = 1e-3
 """Largest `optimality`, and largest violation, of points whose multipliers are costates."""
-
-NO_OTHERS = 1e-6
-"""Largest residual of the objectives asked for with which that of others is not sought: it is hardly less, and takes as long."""
-
-NAMED, SIDE = 3, 0.1
-"""Most constraints that are named where nothing is feasible; part of the largest violation from which on others are, too."""
 
 
 def from_archive(
@@ -81,7 +75,7 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
     """The columns `optimality` and `costates` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left
     when the work is to end.
 
-    Only what is `OPTIMAL` has costates: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other weights
+    Only what is `CERTIFIED` has costates: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other weights
     may do as well at an end of a front.
     """
     optimality: list[float | None] = [None] * len(Z)
@@ -92,10 +86,11 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
             conditions = Conditions.of(nlp, z, ranges)
             some = None if sole is None else _alone(nlp, z, ranges, sole, conditions)
             known = [one for one in (some, conditions) if one is not None]
-            small = next((one.residual for one in known if one.residual <= NO_OTHERS), None)
+            # With so small a residual of the objectives asked for that of all is not sought: it is hardly less, and takes as long.
+            small = next((one.residual for one in known if one.residual <= 1e-6), None)
             optimality[k] = min((one.residual for one in known), default=np.inf) if small is None else small
-            feasible = nlp.evaluate(z[None])[1][0] <= OPTIMAL
-            best = next((one for one in known if feasible and one.residual <= OPTIMAL), None)
+            feasible = nlp.evaluate(z[None])[1][0] <= CERTIFIED
+            best = next((one for one in known if feasible and one.residual <= CERTIFIED), None)
             multipliers = None if best is None else best.multipliers()
             found[k] = None if multipliers is None else costates(nlp, z, multipliers)
     return {"optimality": optimality, "costates": found}
@@ -119,11 +114,11 @@ def from_vectors(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapp
 
 
 def nearest_violation(nearest: Point) -> str:
-    """Text with the constraints that the least infeasible point violates most, and its violations."""
-    (label, amount), *others = sorted(nearest.violations.items(), key=lambda item: -item[1])[:NAMED]
+    """Text with the at most three constraints that the least infeasible point violates most, each by a tenth of the most at least."""
+    (label, amount), *others = sorted(nearest.violations.items(), key=lambda item: -item[1])[:3]
     if not np.isfinite(amount):
         return f"all failed: {label} is not a number"
-    also = "".join(f", and {name} by {size:.2g}" for name, size in others if size > SIDE * amount)
+    also = "".join(f", and {name} by {size:.2g}" for name, size in others if size > 0.1 * amount)
     return f"the nearest violates {label} by {amount:.2g} of its scale{_scale_in_unit(nearest, label)}{also}"
 
 
@@ -136,8 +131,8 @@ def _scale_in_unit(point: Point, label: str) -> str:
 
 def conflict(nlp: NLP, nearest: Point) -> str:
     """Text of `nearest_violation` for a point that violates least, with the constraints that are in conflict with those it names."""
-    others = [label for label in opposing(nlp, nearest.decision) if not nearest.violations.get(label, 0.0) > nearest.violation * SIDE]
-    return nearest_violation(nearest) + (f", in conflict with {', '.join(others[:NAMED])}" if others else "")
+    others = [label for label in opposing(nlp, nearest.decision) if not nearest.violations.get(label, 0.0) > 0.1 * nearest.violation]
+    return nearest_violation(nearest) + (f", in conflict with {', '.join(others[:3])}" if others else "")
 
 
 def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """A front as labelled arrays and back: the root, and a group for each phase. Nothing here knows files.
 
-`ROOT` and `Layout.table` are all that a front's file has; its reader refuses anything else. Floats go through untouched. Decisions have a
-column for each variable that any point has, and `place`, where in the point's own vector it stands, -1 if it has no such variable.
+`ROOT` and `PhaseArrays.table` are all that a front's file has; its reader refuses anything else. Floats go through untouched. Decisions
+have a column for each variable that any point has, and `place`, where in the point's own vector it stands, -1 if it has no such variable.
 Attributes are texts and numbers; what has structure is JSON.
 
 In a phase each state, control and path constraint is an array `(point, node)` of its own name, and so are each costate and the Hamiltonian;
@@ -52,7 +52,7 @@ from .points import COLUMNS, Points
 from .provenance import read_source, read_stats, source_attributes, stats_attributes
 
 FORMAT = "MACS front"
-VERSION = 3
+FORMAT_VERSION = 3
 
 ROOT: dict[str, FileArray] = {
     "objectives": FileArray(("point", "objective"), NUMBER, "objectives in the user's senses", "see objective_unit"),
@@ -220,7 +220,7 @@ def quantity_names(names: Names) -> dict[str, list[str]]:
     return found
 
 
-class Layout:
+class PhaseArrays:
     """The arrays of one phase, from the names of its states, controls and path constraints, and their units."""
 
     def __init__(self, names: Names, units: Names, time_unit: str) -> None:
@@ -254,7 +254,7 @@ def write_phase(name: str, phases: Sequence[PhaseTrajectory | None], costates: S
     variables: dict[str, tuple[Variable, ...] | tuple[Limit, ...]]
     variables = {"state": first.state_variables, "control": first.control_variables, "path": first.path_limits}
     names = {kind: [v.name for v in those] for kind, those in variables.items()}
-    layout = Layout(names, {kind: [v.unit for v in those] for kind, those in variables.items()}, first.time_unit)
+    layout = PhaseArrays(names, {kind: [v.unit for v in those] for kind, those in variables.items()}, first.time_unit)
     time = padded(_each(phases, "time"), (0,))
     arrays = {"time": time, **_counts(["node"], [(0 if one is None else len(one.time),) for one in phases])}
     for kind, attribute in AT_NODES.items():
@@ -282,7 +282,7 @@ def read_phase(name: str, group: Group, points: int) -> tuple[list[PhaseTrajecto
         if not all(isinstance(one, str) for one in those):
             raise ValueError(f"'{kind}' has numbers, not texts")
         distinct(those, f"entries of '{kind}' in phase '{name}'")
-    layout = Layout(names, {kind: [""] * len(those) for kind, those in names.items()}, time_unit)
+    layout = PhaseArrays(names, {kind: [""] * len(those) for kind, those in names.items()}, time_unit)
     data = checked(layout.table, group)
     if data.sizes["point"] != points:
         raise ValueError(f"phase '{name}' has {data.sizes['point']} points, the front has {points}")
@@ -315,7 +315,7 @@ def _joined(data: Labelled, arrays: Sequence[str]) -> np.ndarray:
     return np.stack([data[array] for array in arrays], axis=-1) if arrays else np.empty((*data["time"].shape, 0))
 
 
-def _read_costates(data: Labelled, phase: str, layout: Layout, states: Sequence[str], nodes: list[int]) -> list[PhaseCostates | None]:
+def _read_costates(data: Labelled, phase: str, layout: PhaseArrays, states: Sequence[str], nodes: list[int]) -> list[PhaseCostates | None]:
     missing = [array for array in layout.of_costates if array not in data.arrays]
     if len(missing) == len(layout.of_costates):
         return [None] * len(nodes)
@@ -399,7 +399,7 @@ def _places(front: Points) -> np.ndarray:
 def _attributes(front: Points) -> dict[str, Any]:
     return {
         "format": FORMAT,
-        "format_version": VERSION,
+        "format_version": FORMAT_VERSION,
         **source_attributes(front.source),
         **stats_attributes(front.stats),
         "solver": document(front.solver),

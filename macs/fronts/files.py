@@ -28,8 +28,8 @@ from .dataset import (
     AT_NODES,
     CLOSEST,
     FORMAT,
+    FORMAT_VERSION,
     ROOT,
-    VERSION,
     group_names,
     phase_dataset,
     phase_names,
@@ -41,7 +41,7 @@ from .dataset import (
 from .points import Points
 from .provenance import STATS, stats_attributes
 
-LARGEST = 2**30
+LARGEST_FRONT = 2**30
 """Bytes that a file may have."""
 PHASES = "phases"
 """Attribute of a root: the groups of its phases, in their order, as JSON."""
@@ -60,7 +60,7 @@ def save(front: Points, path: str | PathLike[str]) -> None:
 def load(path: str | PathLike[str], problem: Any = None, trust: bool = False) -> Points:
     """Read a front; see `Front.load`."""
     try:
-        content = read_whole(path, LARGEST)
+        content = read_whole(path, LARGEST_FRONT)
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no file '{path}'") from None
     except OSError as error:
@@ -70,7 +70,7 @@ def load(path: str | PathLike[str], problem: Any = None, trust: bool = False) ->
     except Exception as error:
         # HDF5 raises errors of many classes for a damaged or foreign file: whichever it is, the user's file is wrong.
         raise ValueError(f"{path} does not hold a front that can be read: {_reason(content, error)}") from error
-    if version < VERSION:
+    if version < FORMAT_VERSION:
         text = f"{path} was written by an earlier MACS (format {version}) and has no checksum: damage is not noticed. Save it again."
         warnings.warn(text, stacklevel=3)
     if front.source is None and problem is not None:
@@ -84,10 +84,10 @@ def load(path: str | PathLike[str], problem: Any = None, trust: bool = False) ->
 
 
 def to_bytes(front: Points) -> bytes:
-    """The content of a front's file. Raises ValueError for a front of more than `LARGEST` bytes."""
+    """The content of a front's file. Raises ValueError for a front of more than `LARGEST_FRONT` bytes."""
     content = sealed(netcdf.to_bytes(dict(_datasets(front))))
-    if len(content) > LARGEST:
-        raise ValueError(f"the front has {len(content)} bytes, a file at most {LARGEST}: save fewer points")
+    if len(content) > LARGEST_FRONT:
+        raise ValueError(f"the front has {len(content)} bytes, a file at most {LARGEST_FRONT}: save fewer points")
     return content
 
 
@@ -120,9 +120,9 @@ def _read(content: bytes) -> tuple[Points, int]:
     if root.attrs.get("format") != FORMAT:
         raise ValueError("it is a netCDF file of something else")
     version = read_attribute(root.attrs, "format_version", int)
-    if version > VERSION:
-        raise ValueError(f"its format is version {version}, this MACS reads up to version {VERSION}: update MACS")
-    if (whole is None) != (version < VERSION) or version < 1:
+    if version > FORMAT_VERSION:
+        raise ValueError(f"its format is version {version}, this MACS reads up to version {FORMAT_VERSION}: update MACS")
+    if (whole is None) != (version < FORMAT_VERSION) or version < 1:
         raise ValueError(f"its format is version {version}, {'without' if whole is None else 'with'} a checksum: no MACS wrote it so")
     closest = root.groups.pop(CLOSEST, None)
     return _read_front(root, version, None if closest is None else _read_front(closest, version)), version
@@ -145,7 +145,7 @@ def upgrade(root: Group, phases: dict[str, Group], version: int) -> tuple[Group,
     Format 1 had one transcription and no notes. Up to format 2, names without entries had no bounds, states, controls and path constraints
     were in one array each, and the numbers of `stats` in its JSON.
     """
-    if version == VERSION:
+    if version == FORMAT_VERSION:
         return root, phases
     n = len(root.arrays["violation"])
     arrays, attrs = {**root.arrays}, {**root.attrs}

@@ -6,7 +6,7 @@ import platform
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -94,47 +94,36 @@ STATS: dict[str, Any] = {
 """Entries that the `stats` of every front have, beside `versions`."""
 
 
-PACKAGES = ("macs-trajectories", "casadi", "numpy", "pymoo", "scipy")
-
-
-@lru_cache(maxsize=1)
-def _found() -> tuple[tuple[str, str], ...]:
-    found = [("python", platform.python_version()), ("platform", f"{platform.system()} {platform.machine()}")]
-    for package in PACKAGES:
-        try:
-            found.append((package, version(package)))
-        except PackageNotFoundError:
-            found.append((package, "unknown"))
-    return tuple(found)
-
-
 def versions() -> dict[str, str]:
     """Versions of Python, of this package and of those whose arithmetic its results depend on, by name."""
-    return dict(_found())
+    packages = ("macs-trajectories", "casadi", "numpy", "pymoo", "scipy")
+    system = f"{platform.system()} {platform.machine()}"
+    return {"python": platform.python_version(), "platform": system, **{package: _version(package) for package in packages}}
+
+
+@cache
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+COUNTED = ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "work", "gradient_work")
+"""Fields of `Counts` that are entries of `stats`."""
 
 
 def costs(counts: Counts, **about: Any) -> dict[str, Any]:
     """`stats` of a front from the counts of a run, with `about`: `wall_time`, `seed`, `tolerance` and more."""
-    return {
-        "evaluations": counts.evaluations,
-        "inner_iterations": counts.inner_iterations,
-        "gradient_solves": counts.gradient_solves,
-        "fallbacks": counts.fallbacks,
-        "failures": dict(counts.failures),
-        "work": counts.work,
-        "gradient_work": counts.gradient_work,
-        **about,
-    }
+    return {**{key: getattr(counts, key) for key in COUNTED}, "failures": dict(counts.failures), **about}
 
 
 def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopped: str) -> dict[str, Any]:
     """`stats` of a front that was worked on further: counts and seconds are added, `stopped` says what ended the work early."""
+    added = ("gradient_solves", "inner_iterations", "work", "gradient_work")
     return {
         **stats,
-        "gradient_solves": stats["gradient_solves"] + counts.gradient_solves,
-        "inner_iterations": stats["inner_iterations"] + counts.inner_iterations,
-        "work": stats.get("work", 0) + counts.work,
-        "gradient_work": stats.get("gradient_work", 0) + counts.gradient_work,
+        **{key: stats.get(key, 0) + getattr(counts, key) for key in added},
         "wall_time": stats["wall_time"] + wall_time,
         "reproducible": stats["reproducible"] and not (counts.clocked or stopped),
         **({"stopped": stopped} if stopped else {}),
@@ -143,20 +132,15 @@ def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopp
 
 def merged_stats(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """`stats` of merged fronts: costs are summed, seeds listed; the loosest tolerances and the least reproducible run count for all."""
-    summed = {key: sum(s[key] for s in several) for key in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time")}
-    failures: Counter[str] = Counter()
-    found: dict[str, dict[str, None]] = {}
-    seeds: list[Any] = []
+    seeds = [seed for stats in several for seed in (stats["seed"] if isinstance(stats["seed"], list) else [stats["seed"]])]
     verify = [stats["verify"] for stats in several if "verify" in stats]
+    found: dict[str, dict[str, None]] = {}
     for stats in several:
-        failures.update(stats["failures"])
-        seeds += stats["seed"] if isinstance(stats["seed"], list) else [stats["seed"]]
         for package, number in stats["versions"].items():
             found.setdefault(package, {})[number] = None
     return {
-        **summed,
-        "failures": dict(failures),
-        **{key: sum(stats.get(key, 0) for stats in several) for key in ("work", "gradient_work")},
+        **{key: sum(stats.get(key, 0) for stats in several) for key in (*COUNTED, "wall_time")},
+        "failures": dict(sum((Counter(stats["failures"]) for stats in several), Counter())),
         "seed": seeds if len(seeds) > 1 else seeds[0],
         "tolerance": max(stats["tolerance"] for stats in several),
         "reproducible": all(stats["reproducible"] for stats in several),

@@ -22,10 +22,6 @@ if TYPE_CHECKING:
     from .points import Points
 
 
-FEW_VARIABLES = 6
-"""Number of variables of a vector problem that stand in tables."""
-
-
 def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
     """Text with a headline, a row for each point and a footer; see `Front.table`.
 
@@ -43,19 +39,15 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
     return "\n".join([headline(front), "", *lines, "", *footer(front)]).rstrip()
 
 
-MOST = 30
-"""Most rows of a front in a notebook."""
-
-
-def front_html(front: Points, picture: bytes) -> str:
+def front_html(front: Points, picture: bytes, most: int = 30) -> str:
     """HTML of a front for notebooks: headline, table, remarks and a picture of it, a PNG."""
     what = f"front: {headline(front)}"
     if not len(front):
         return html_block(headline(front), "", _nothing(front)[:1], picture, what)
     table = _table(front, {})
     dim = range(len(front) - table.apart, len(front))
-    shown = html_table(table.headers, table.rows[:MOST], table.left, dim)
-    notes = [f"{counted(len(front) - MOST, 'more point')}: front.table()"] if len(front) > MOST else []
+    shown = html_table(table.headers, table.rows[:most], table.left, dim)
+    notes = [f"{counted(len(front) - most, 'more point')}: front.table()"] if len(front) > most else []
     notes += [f"Grey: {_said_apart(front)}"] if table.apart else []
     return html_block(headline(front), shown, [*notes, *footer(front)], picture, what)
 
@@ -89,7 +81,7 @@ def _table(front: Points, columns: Mapping[str, Sequence[Any]]) -> _Table:
     for goal, values in zip(front.goals, front.objectives.T, strict=True):
         add(goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]", numbers(values))
     add("violation", "", _small(front.violation))
-    if _is_vector(front) and len(front.variables) <= FEW_VARIABLES:
+    if _is_vector(front) and len(front.variables) <= 6:
         for variable, values in zip(front.variables, front.decision.T, strict=True):
             add(variable.name, f"[{variable.unit or '-'}]", numbers(values))
     if simulated.any():
@@ -174,9 +166,9 @@ def _excursion(found: Mapping[str, float] | None) -> str:
     return f"{name} by {found[name]:.2g}{rest}"
 
 
-FEW = 5
+MOST_NAMED = 5
 """Number of points whose misses are given in words, or that are named in a line."""
-VARIES = 0.05
+HAMILTONIAN_VARIES = 0.05
 """Part of its terms by which a Hamiltonian that is to be constant varies where the mesh is said not to resolve the optimum: it varied by
 less on all meshes whose optimum was right to 5e-4, and by more on a third of the others (`tests/macs/fronts/test_unresolved.py`)."""
 
@@ -196,9 +188,9 @@ def footer(front: Points) -> list[str]:
         ended = f"The search was ended early ({why})" if why != "budget" else "An inner solve reached its time limit"
         lines.append(f"{ended}: the same seed may give another front.")
     missing = [point.index for point in front if MISSES in point.note or AGAIN in point.note]
-    lines += [f"Point {point.index}: {point.note}." for point in front if point.note and point.index not in missing[FEW:]]
-    if len(missing) > FEW:
-        rest = len(missing) - FEW
+    lines += [f"Point {point.index}: {point.note}." for point in front if point.note and point.index not in missing[MOST_NAMED:]]
+    if len(missing) > MOST_NAMED:
+        rest = len(missing) - MOST_NAMED
         lines.append(f"The note{'s' if rest > 1 else ''} of {counted(rest, 'more point')} say{'' if rest > 1 else 's'} what is missed.")
     if front.message:
         lines.append(front.message)
@@ -226,11 +218,11 @@ def _unresolved(front: Points) -> list[str]:
         if point.costates is None or point.trajectory is None or point.verified is False or not issubclass(method, DFET):
             continue
         part = hamiltonian_variation(front.problem, point.trajectory, point.costates)
-        if part > VARIES:
+        if part > HAMILTONIAN_VARIES:
             found[point.index] = part
     if not found:
         return []
-    which = f"{len(found)} points" if len(found) > FEW else f"point{'s' if len(found) > 1 else ''} {', '.join(map(str, found))}"
+    which = f"{len(found)} points" if len(found) > MOST_NAMED else f"point{'s' if len(found) > 1 else ''} {', '.join(map(str, found))}"
     most = max(found.values())
     size = "by more than its terms" if most > 1 else f"by {'up to ' if len(found) > 1 else ''}{100 * most:.2g} % of its terms"
     remedy = "front.refine_mesh() finds meshes that are nearer to that"

@@ -26,7 +26,7 @@ from .point import Point
 from .points import Points
 from .verified import evaluated_independently, objective_scales, simulated_independently
 
-EQUAL = 1e-9
+OTHER_MACHINE = 1e-9
 """Numbers that another run of the same arithmetic on another machine may give, in scales."""
 
 
@@ -83,8 +83,8 @@ def verify(
         objectives = float(np.where(np.isnan(off), np.inf, off).max(initial=0.0))
         failures = [
             (not front.dynamic and not np.isfinite(F).all(), f"{again}, it fails"),
-            (not mismatch <= EQUAL, f"stored {where} differ from the decision vector by {mismatch:.1e}"),
-            (front.dynamic and not objectives <= EQUAL, f"stored objectives differ from recomputed ones by {objectives:.1e}"),
+            (not mismatch <= OTHER_MACHINE, f"stored {where} differ from the decision vector by {mismatch:.1e}"),
+            (front.dynamic and not objectives <= OTHER_MACHINE, f"stored objectives differ from recomputed ones by {objectives:.1e}"),
             (not abs(violation - point.violation) <= limit, f"stored violation {point.violation:.1e}, {before} {violation:.1e}"),
             (point.status != CONVERGED, f"its status is '{point.status}'"),
             (not violation <= limit, f"violates {worst} by {violation:.1e} (tolerance {limit:.0e})"),

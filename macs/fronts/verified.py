@@ -29,12 +29,8 @@ Kind = TypeVar("Kind", bound=Points)
 
 VERIFY = 1e-3
 """How much a point may miss by default when it is simulated, in scales."""
-PART = 1e-4
+INTEGRATOR_SHARE = 1e-4
 """Error of the integrator, as a fraction of what a point may miss."""
-COARSEST, FINEST = 1e-7, 1e-12
-"""Relative tolerances of the integrator."""
-NOTHING = 1e-6
-"""Smallest scale of an objective, as a fraction of how much it varies within the bounds of the problem."""
 MISSES, AGAIN = "simulated, ", "evaluated again, "
 """Beginnings of a note on what a point misses, of a trajectory and of a vector problem."""
 
@@ -214,7 +210,7 @@ def check_verify(tolerance: float | None) -> None:
 
 def accuracy(tolerance: float) -> tuple[float, float]:
     """Tolerances rtol and atol of an integrator that is to detect an error of `tolerance`."""
-    rtol = float(np.clip(PART * tolerance, FINEST, COARSEST))
+    rtol = float(np.clip(INTEGRATOR_SHARE * tolerance, 1e-12, 1e-7))
     return rtol, 0.1 * rtol
 
 
@@ -235,7 +231,8 @@ def _variation(points: Points) -> tuple[np.ndarray, np.ndarray]:
     """The objectives (k, m) of the feasible points, and the smallest scale (m,) that each may have."""
     good = (points.status == CONVERGED) & np.isfinite(points.F).all(axis=1)
     F = points.F[good] if good.any() else np.zeros((1, len(points.goals)))
-    least = NOTHING * objective_spreads(points.problem) if isinstance(points.problem, CompiledProblem) else np.zeros(F.shape[1])
+    # Round-off: a millionth of how much it varies within the bounds of the problem.
+    least = 1e-6 * objective_spreads(points.problem) if isinstance(points.problem, CompiledProblem) else np.zeros(F.shape[1])
     return F, least
 
 
@@ -248,12 +245,12 @@ def largest_miss(problem: CompiledProblem, simulation: Simulation, F: np.ndarray
 def _growing(problem: CompiledProblem, trajectory: Trajectory | None, tolerance: float) -> str:
     """A remark if each element by itself is right, so that small errors grow until the end: then no finer mesh can help."""
     assert trajectory is not None
-    rtol, atol = accuracy(PART * tolerance)
+    rtol, atol = accuracy(INTEGRATOR_SHARE * tolerance)
     try:
         own = simulate_elements(problem, trajectory, rtol=rtol, atol=atol).max_defect
     except Stopped:
         return ""
-    if not own <= PART * tolerance:
+    if not own <= INTEGRATOR_SHARE * tolerance:
         return ""
     return f", though on each element by at most {own:.0e}: the dynamics are unstable, and no simulation without feedback can follow them"
 

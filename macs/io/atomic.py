@@ -101,17 +101,13 @@ def _target(path: str | PathLike[str]) -> tuple[Path, os.stat_result | None]:
 
 
 MARK = b"\0MACS SHA-256\r\n\0"
-
-
-LENGTH, DIGEST = 8, 32
-
-
-SIZE = len(MARK) + LENGTH + DIGEST
+SEAL = len(MARK) + 8 + 32
+"""Bytes of a mark, a length and a digest."""
 
 
 def sealed(content: bytes) -> bytes:
     """The content, with its seal."""
-    length = len(content).to_bytes(LENGTH, "little")
+    length = len(content).to_bytes(8, "little")
     return b"".join([content, MARK, length, hashlib.sha256(content + length).digest()])
 
 
@@ -119,8 +115,8 @@ def unsealed(data: bytes) -> bytes | None:
     """The content without its seal; None if there is no mark in it."""
     if MARK not in data:
         return None
-    content, seal = data[:-SIZE], data[-SIZE:]
-    length = len(content).to_bytes(LENGTH, "little")
+    content, seal = data[:-SEAL], data[-SEAL:]
+    length = len(content).to_bytes(8, "little")
     if seal != MARK + length + hashlib.sha256(content + length).digest():
         raise ValueError("it is cut short or damaged: its content does not match its checksum")
     return content

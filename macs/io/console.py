@@ -18,9 +18,9 @@ import numpy as np
 
 from .interrupts import Interrupts
 
-EVERY = 10.0
+LINE_EVERY = 10.0
 """Seconds between plain lines."""
-LONG = 2.0
+SHOWN_AFTER = 2.0
 """Seconds after which work is shown by default."""
 
 
@@ -37,7 +37,7 @@ class Display(AbstractContextManager, ABC):
     def __init__(self, shown: bool | None = True, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr
         self._shown = is_live(self._stream) if shown is None else shown
-        self._delay = LONG if shown is None else 0.0
+        self._delay = SHOWN_AFTER if shown is None else 0.0
         self._live: Any = None
         self._token: Token[bool] | None = None
         self._began, self._written = time.perf_counter(), -float("inf")
@@ -58,12 +58,12 @@ class Display(AbstractContextManager, ABC):
         return time.perf_counter() - self._began
 
     def refresh(self) -> None:
-        """Begin a display that was delayed. Without a terminal, write a plain line, if the last one is at least `EVERY` seconds old."""
+        """Begin a display that was delayed. Without a terminal, write a plain line, if the last one is `LINE_EVERY` seconds old."""
         if not self._due or self._live is not None:
             return
         if self._stream.isatty():
             self._begin()
-        elif self.elapsed - self._written >= EVERY:
+        elif self.elapsed - self._written >= LINE_EVERY:
             self._write(self.line())
 
     @property

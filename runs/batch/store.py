@@ -31,7 +31,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from macs.front import Front
-from macs.fronts.files import LARGEST as LARGEST_FRONT
+from macs.fronts.files import LARGEST_FRONT
 from macs.io.atomic import read_whole, write_whole
 from macs.io.text import duration, html_block, html_table, text_table
 

@@ -25,12 +25,6 @@ def test_a_front_is_sorted_by_its_first_objective_in_the_users_value():
     assert front.names == ("time", "height") and front.units == ("s", "km") and front.senses == ("minimize", "maximize")
 
 
-def test_a_maximised_first_objective_sorts_upwards_too():
-    goals = compiled().goals[::-1]
-    front = flights(3, F=[[-1, 0], [-3, 0], [-2, 0]], goals=goals)
-    assert front.objectives[:, 0].tolist() == [1, 2, 3]
-
-
 def test_payoff_order_is_kept_and_nan_sorts_last():
     F = [[3.0, 0.0], [np.nan, np.nan], [1.0, 0.0]]
     assert flights(3, F=F, sort=False).F[:, 0].tolist()[::2] == [3, 1]
@@ -83,12 +77,6 @@ def test_a_black_box_has_no_trajectory_and_its_errors_name_the_reason():
     assert point.parameters.keys() == {"span", "chord", "twist"}
     with pytest.raises(ValueError, match="black box"):
         point.simulate()
-
-
-def test_the_error_of_an_unknown_problem_names_the_argument_to_pass():
-    front = flights(problem=ProblemSource("two legs", "0" * 32))
-    with pytest.raises(ValueError, match=r"'two legs' was stated in a script.*problem=problem"):
-        front[0].simulate()
 
 
 def test_a_problem_that_changed_is_not_simulated(monkeypatch):
@@ -149,12 +137,6 @@ def test_merging_sums_what_was_spent():
     assert merged.stats["failures"] == {"failed": 3, "infeasible": 1}
     assert merged.stats["seed"] == [4, 5] and merged.stats["tolerance"] == 1e-6 and merged.stats["reproducible"] is False
     assert Front.merge([merged, merged]).stats["seed"] == [4, 5, 4, 5]
-
-
-def test_merging_drops_what_did_not_converge():
-    bad = flights(2, F=[[0.0, -100.0], [np.nan, np.nan]], status=["infeasible", "failed"], sort=False)
-    good = flights(3)
-    assert np.array_equal(Front.merge([bad, good]).F, Front.merge([good]).F)
 
 
 def test_merging_only_empty_fronts_keeps_the_closest():

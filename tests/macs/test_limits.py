@@ -8,11 +8,9 @@ from __future__ import annotations
 import io
 import logging
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from contextlib import contextmanager
@@ -84,15 +82,6 @@ def test_a_time_limit_ends_a_solve_between_its_iterations():
     assert stats["return_status"] == "User_Requested_Stop" and stats["iter_count"] > 10
 
 
-@pytest.mark.slow
-def test_ctrl_c_ends_a_solve_between_its_iterations():
-    solver = endless()
-    with Interrupts() as interrupts, ctrl_c(LIMIT), within(BOUND):
-        solver(x0=-1.0)
-        assert interrupts.reason == "interrupted"
-    assert solver.stats()["return_status"] == "User_Requested_Stop"
-
-
 def test_ctrl_c_that_nobody_handles_is_not_swallowed_by_a_solve():
     solver = endless()
     with within(BOUND), pytest.raises(KeyboardInterrupt), ctrl_c(LIMIT):
@@ -135,9 +124,7 @@ def test_derivatives_in_pieces_are_those_of_the_whole(monkeypatch):
         assert np.abs(np.array(ca.DM(other)) - one).max() <= 1e-12 * np.abs(one).max()
 
 
-@pytest.mark.parametrize(
-    ("method", "built"), [*((MultipleShooting(9), built) for built in range(1, 8, 2)), (DFET(3, 3), 1), (DFET(3, 3), 2)]
-)
+@pytest.mark.parametrize(("method", "built"), [(MultipleShooting(9), 1), (MultipleShooting(9), 7), (DFET(3, 3), 2)])
 def test_they_are_not_built_to_the_end(method, built, monkeypatch):
     monkeypatch.setattr(derivatives, "PIECE", 7)
     nlp = method.transcribe(load("orbit_rise"))
@@ -227,24 +214,14 @@ def test_what_was_found_is_still_simulated_if_that_is_quick():
     assert found.stats["stopped"] == "interrupted" and len(found) and found.was_simulated.all()
 
 
-def test_ctrl_c_ends_a_simulation_that_nobody_handles_at_once(endless_integrations):
-    front = stiff_front()
-    with within(BOUND), pytest.raises(KeyboardInterrupt), ctrl_c(LIMIT):
-        front[0].simulate()
-
-
 # Set-up
 
 
-def test_a_search_without_time_for_its_first_evaluation_says_so():
+def test_a_search_without_time_for_its_first_evaluation_says_so(tmp_path):
     front = MACS().solve(load("goddard"), DFET(4, 3), evaluations=100, seed=1, time_limit=1e-9)
     assert len(front) == 0 and front.message == "nothing was evaluated yet: time limit"
     assert front.stats["evaluations"] == 0 and front.stats["stopped"] == "time limit" and not front.stats["reproducible"]
     assert front.stats["seed"] == 1 and front.names == ("flight time", "horizontal speed") and "time limit" in front.table()
-
-
-def test_such_a_front_can_be_saved(tmp_path):
-    front = MACS().solve(load("goddard"), DFET(4, 3), evaluations=100, seed=1, time_limit=1e-9)
     front.save(tmp_path / "front.nc")
     again = Front.load(tmp_path / "front.nc")
     assert len(again) == 0 and again.message == front.message and again.stats["stopped"] == "time limit"
@@ -330,19 +307,11 @@ def test_a_time_limit_ends_a_compiler(doubled, tmp_path, caplog):
     assert not caplog.text and batched.compiler(), "that was not its fault"
 
 
-@pytest.mark.parametrize("command", ["false", "/nowhere/cc", "true"])
+@pytest.mark.parametrize("command", ["false", "/nowhere/cc"])
 def test_a_compiler_that_fails_leaves_a_note(doubled, command, caplog):
     with caplog.at_level(logging.WARNING):
         assert right(doubled(command)) and right(doubled(command))
     assert caplog.text.count("functions are not compiled, and take more time: ") == 1 and command in caplog.text
-
-
-@pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
-def test_without_a_folder_for_temporary_files_nothing_is_compiled(doubled, monkeypatch, caplog, tmp_path):
-    compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))))
-    function = doubled(compiler)
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
-    assert right(function) and "functions are not compiled" in caplog.text
 
 
 # Work within work
@@ -380,7 +349,7 @@ class Terminal(io.StringIO):
 
 
 def test_progress_shows_itself_on_a_terminal_if_it_takes_long(monkeypatch):
-    monkeypatch.setattr(console, "LONG", 0.2)
+    monkeypatch.setattr(console, "SHOWN_AFTER", 0.2)
     quick, slow, elsewhere = Terminal(), Terminal(), io.StringIO()
     with StatusLine(None, quick) as show:
         show("soon over")
@@ -391,19 +360,6 @@ def test_progress_shows_itself_on_a_terminal_if_it_takes_long(monkeypatch):
             show("it goes on")
             time.sleep(0.2)
     assert not quick.getvalue() and not elsewhere.getvalue() and "it goes on" in slow.getvalue()
-
-
-def test_a_part_of_what_is_shown_does_not_show_itself(monkeypatch):
-    monkeypatch.setattr(console, "LONG", 1e-9)
-    whole, part, asked = Terminal(), Terminal(), Terminal()
-    with StatusLine(None, whole) as show:
-        show("all of it")
-        with StatusLine(None, part) as status:
-            status("a part")
-        with StatusLine(True, asked) as status:
-            status("asked for")
-            time.sleep(0.3)
-    assert "all of it" in whole.getvalue() and not part.getvalue() and "asked for" in asked.getvalue()
 
 
 # The command line

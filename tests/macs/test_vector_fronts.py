@@ -1,15 +1,13 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from vector_problems import parabolas
 
-from macs import CTAEA, MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA, Front, optimize, payoff, sweep
+from macs import MACS, MOPSO, NSGA2, Front, optimize, payoff, sweep
 from macs.decisions import Dialogue, ReferencePoint, decide
-from macs.evaluation.blackbox import BlackBox
 from macs.fronts.verification import verify
 from macs.gradient_solvers import Sweep
 from macs.solvers.checkpoint import Unreadable
@@ -66,13 +64,6 @@ def test_solve_and_minimize_are_one_search():
         other = solver.minimize(plain, {"x": (-4, 4), "y": (-1, 1)}, senses=senses, evaluations=400, seed=2)
         assert np.array_equal(one.F, other.F) and np.array_equal(one.decision, other.decision)
     assert other.source is None and not other.was_simulated.any()
-
-
-@pytest.mark.slow
-def test_every_search_solves_it():
-    for solver in (NSGA3(), MOEAD(population=20), MOPSOCD(particles=20), SMSEMOA(population=20), RVEA(), CTAEA(population=20)):
-        found = solver.solve(parabolas(), evaluations=300, seed=1)
-        assert len(found) and found.verified.all()
 
 
 def test_rows_beyond_the_budget_are_those_of_the_fingerprint_and_those_evaluated_again():
@@ -218,15 +209,6 @@ def test_choices_are_made_from_known_points(front):
     assert "black box has no derivatives" in dialogue.choose().message
 
 
-@pytest.mark.slow
-def test_a_preference_guides_it():
-    wish = ReferencePoint({"near": 0.3, "nearness": -2.0})
-    even, guided = (MACS(prefer=prefer).solve(parabolas(), evaluations=2000, seed=3) for prefer in (None, wish))
-    best = wish.rank(even).best.objectives["near"]
-    close = [np.sum(np.abs(one.objectives[:, 0] - best) < 0.3) for one in (even, guided)]
-    assert close[1] > close[0] + 2
-
-
 def test_a_checkpoint_continues_to_the_same_bits(tmp_path):
     whole = MACS().solve(parabolas(), evaluations=400, seed=5)
     file = tmp_path / "run.ckpt"
@@ -235,26 +217,6 @@ def test_a_checkpoint_continues_to_the_same_bits(tmp_path):
     assert np.array_equal(whole.F, rest.F) and np.array_equal(whole.decision, rest.decision) and rest.verified.all()
     with pytest.raises(Unreadable, match=r"problem.fingerprint"):
         MACS().solve(parabolas(far=3.0), evaluations=400, seed=5, checkpoint=file)
-
-
-def test_starts_limits_and_callbacks_are_as_for_plain_functions():
-    begun = MACS().solve(parabolas(), evaluations=40, seed=1, start=[[0.0, 0.0], [1.5, 0.0]])
-    assert begun.objectives[0, 0] == 0.0 and begun.objectives[-1, 0] == 2.25
-    with pytest.raises(ValueError, match="start: decision 0 has x = 9"):
-        MACS().solve(parabolas(), evaluations=40, start=[[9.0, 0.0]])
-    for setting, message in ({"evaluations": 0}, "evaluations"), ({"verify": -1.0}, "verify"), ({"seed": -1}, "seed"):
-        with pytest.raises(ValueError, match=message):
-            MACS().solve(parabolas(), **{"evaluations": 40, **setting})
-    unmarked = MACS().solve(parabolas(), evaluations=40, seed=1, verify=None)
-    assert not unmarked.was_simulated.any() and "evaluated_again" not in unmarked.stats
-
-
-def test_a_periodic_variable_wraps_around():
-    problem = parabolas()
-    angle = replace(problem.variables["y"], period=2.0)
-    box = BlackBox(replace(problem.compile(), variables=(problem.variables["x"], angle)))
-    assert box.period.tolist() == [0.0, 2.0]
-    assert box.box.confine(np.array([[0.0, 1.2]]))[0, 1] == pytest.approx(-0.8)
 
 
 def test_a_function_that_fails_in_the_end_loses_no_front():
@@ -266,14 +228,6 @@ def test_a_function_that_fails_in_the_end_loses_no_front():
 
     found = MACS().solve(parabolas(function=Tired()), evaluations=100, seed=1)
     assert len(found) and not found.was_simulated.any() and "not simulated, since this failed (RuntimeError: tired)" in found.message
-
-
-def test_fronts_of_one_problem_merge_and_those_of_others_do_not(front):
-    other = MACS().solve(parabolas(), evaluations=300, seed=9)
-    merged = Front.merge([front, other])
-    assert merged.source == front.source and len(merged) > 5
-    with pytest.raises(ValueError, match="different problems"):
-        Front.merge([front, MACS().solve(parabolas(wall=1.2), evaluations=100, seed=1)])
 
 
 def test_pictures_have_a_panel_for_each_variable(front, tmp_path):

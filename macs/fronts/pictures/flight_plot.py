@@ -16,17 +16,20 @@ from ...io.text import html_block, html_table, per
 from .style import (
     COLORS,
     GREY,
-    STYLE,
     axis_label,
-    axis_number,
+    beside,
     blank_figure,
     draw_limits,
+    figure_title,
     hollow,
-    new_figure,
+    interval,
+    note_above,
+    panel_grid,
     plain,
     raised,
     remark,
     rendered,
+    styled,
     wrapped,
 )
 
@@ -36,22 +39,8 @@ if TYPE_CHECKING:
 
 DENSE = np.linspace(-1.0, 1.0, 41)
 """Points in [-1, 1] of each element at which its polynomials are drawn."""
-
-
-LEAST = 1e-3
-"""Least part of the span of its bounds by which a state counts as moving where that is a measure for its costate."""
-
-
-FLAT = 0.02
-"""Least range in which costates and the Hamiltonian are drawn, as a part of what all costates are worth: less is round-off."""
-
-
-NODES = 60
+MOST_DOTS = 60
 """Most nodes of a phase that are drawn as dots: more would hide the line."""
-
-
-PANEL = (3.6, 1.75)
-"""Inches: width and height of a panel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,34 +63,76 @@ def draw_flight(
     drawn within its bounds, or on a range about it. Costates and the Hamiltonian are of the sum of the objectives times their weights,
     which are above the latter.
     """
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with styled():
         panels = quantities(trajectory)
         least = {} if costates is None else costate_ranges(trajectory, costates)
         states = [name for name, kind in panels if kind == "state" and name in least]
-        columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
-        above = -(-len(panels) // columns)
-        rows = above if costates is None else above - (-(len(states) + 1) // columns)
-        if figure is None:
-            figure = new_figure(PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.6)
-        else:
-            figure.set_size_inches(PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.6)
-        grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-        for ax, (name, kind) in zip(grid, panels, strict=False):
+        groups = [len(panels)] if costates is None else [len(panels), len(states) + 1]
+        figure, axes = panel_grid(figure, groups)
+        for ax, (name, kind) in zip(axes, panels, strict=False):
             draw_panel(ax, [Drawn(trajectory, hollow=hollow)], name, kind)
-        used = list(range(len(panels)))
         if costates is not None:
-            used += range(above * columns, above * columns + len(states) + 1)
-            _draw_costates(grid[used[len(panels) :]], trajectory, costates, least, states)
-        for ax in np.delete(grid, used):
-            ax.remove()
-        _finish(figure, grid, used, columns, trajectory, title)
-    return grid[used]
+            _draw_costates(axes[len(panels) :], trajectory, costates, least, states)
+        for ax in axes:
+            for phase in trajectory.phases[1:]:
+                ax.axvline(phase.t0, color=GREY, lw=0.7, ls=":")
+        _draw_time_axis(figure, axes, trajectory.phases)
+        if len(trajectory) > 1:
+            from matplotlib.lines import Line2D
+
+            names = [phase.name if has_length(trajectory, phase) else f"{phase.name} (no length)" for phase in trajectory.phases]
+            handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=plain(name)) for k, name in enumerate(names)]
+            figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
+        figure_title(figure, title)
+    return axes
+
+
+def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
+    """Axes, one for each state, control and path constraint, with the trajectories of some points over time.
+
+    Dashed lines are bounds and limits, as of one trajectory alone. A dot is the end of a phase that another one follows. Nodes are hollow
+    dots where a trajectory is not verified. Shorter trajectories are above longer ones. The legend has each point's number and objectives.
+    """
+    from matplotlib.lines import Line2D
+
+    if not 1 <= len(points) <= len(COLORS):
+        raise ValueError(f"trajectories of one to {len(COLORS)} points can be told apart in a picture, not of {len(points)}")
+    without = [point.index for point in points if point.trajectory is None]
+    if without:
+        raise ValueError(f"point {without[0]} has no trajectory: its problem has none, or its evaluation failed")
+    drawn = [Drawn(point.trajectory, color, hollow(point)) for point, color in zip(points, COLORS, strict=False)]
+    over = sorted(drawn, key=lambda one: one.trajectory.phases[-1].tf, reverse=True)
+    panels = list(dict.fromkeys(panel for one in drawn for panel in quantities(one.trajectory)))
+    with styled():
+        figure, axes = panel_grid(figure, [len(panels)], above=0.4 + 0.2 * len(points))
+        for ax, (name, kind) in zip(axes, panels, strict=True):
+            draw_panel(ax, over, name, kind)
+        _draw_time_axis(figure, axes, [phase for one in drawn for phase in one.trajectory.phases])
+        named = [wrapped(plain(_words(point)), figure.get_figwidth() - 0.6, 8.0) for point in points]
+        lines = [Line2D([], [], color=one.color, lw=1.5, label=words) for one, words in zip(drawn, named, strict=True)]
+        figure.legend(handles=lines, loc="outside upper left", frameon=False)
+    return axes
+
+
+def _words(point: Any) -> str:
+    """The point's number, its objectives, and whether it is not feasible, not verified or not simulated."""
+    named = zip(point.goals, point.objectives.values(), strict=True)
+    values = ", ".join(f"{goal.name} {value:.5g} {raised(goal.unit)}".rstrip() for goal, value in named)
+    said = remark(point)
+    return f"#{point.index}: {values}{f'; {said}' if said else ''}"
+
+
+def _draw_time_axis(figure: Any, axes: np.ndarray, phases: Sequence[PhaseTrajectory]) -> None:
+    """The label of the time axis, and its range over some phases."""
+    figure.supxlabel(axis_label("time", " | ".join(dict.fromkeys(phase.time_unit for phase in phases))), fontsize=9)
+    figure.align_ylabels()
+    first, last = min(phase.t0 for phase in phases), max(phase.tf for phase in phases)
+    margin = 0.015 * (last - first) or 1.0  # phases without duration are seen, too
+    axes[0].set_xlim(first - margin, last + margin)
 
 
 def _draw_costates(
-    axes: Sequence[Any], trajectory: Trajectory, costates: Costates, least: Mapping[str | None, float], states: Sequence[str]
+    axes: np.ndarray, trajectory: Trajectory, costates: Costates, least: Mapping[str | None, float], states: Sequence[str]
 ) -> None:
     """Draw the costates of these states over time, one on each of the axes, and the Hamiltonian on the last one, in the `least` ranges at
     least. Those of phases without length are left out."""
@@ -130,40 +161,36 @@ def _draw_costates(
         middle, half = 0.5 * (drawn.max() + drawn.min()), 0.5 * max(float(np.ptp(drawn)), least[name], 1e-12)
         ax.set_ylim(middle - 1.12 * half, middle + 1.12 * half)
         unit = per(units[0]) if len(set(units)) == 1 else ""
-        ax.set_ylabel(_beside("Hamiltonian" if name is None else f"costate of {name}", unit))
+        ax.set_ylabel(beside("Hamiltonian" if name is None else f"costate of {name}", unit))
     weights = ", ".join(f"{weight:.3g}" for weight in costates.weights)
-    axes[-1].set_title(f"weights of the objectives: {weights}", loc="right", fontsize=7, color=GREY, pad=2)
+    note_above(axes[-1], f"weights of the objectives: {weights}")
     left_out = [phase.name for phase in trajectory.phases if not has_length(trajectory, phase)]
     if left_out:
         words = f"no costates of {', '.join(left_out)}: without length"
-        axes[0].set_title(plain(words), loc="right", fontsize=7, color=GREY, pad=2)
-
-
-def _beside(name: str, unit: str) -> str:
-    """The label of a vertical axis, in lines no longer than a panel is high."""
-    return wrapped(axis_label(name, unit), PANEL[1] - 0.25)
+        note_above(axes[0], plain(words))
 
 
 def _dots(ax: Any, times: np.ndarray, values: np.ndarray, color: str, hollow: bool = False) -> None:
     """Nodes as dots, if there are not too many; hollow ones in any case, but no more than that."""
     if hollow:
-        every = -(-len(values) // NODES)
+        every = -(-len(values) // MOST_DOTS)
         ax.plot(times, values, "o", color=color, ms=3.2, mfc="white", mew=0.7, markevery=every, zorder=3)
-    elif len(values) <= NODES:
+    elif len(values) <= MOST_DOTS:
         ax.plot(times, values, ".", color=color, ms=3.5)
 
 
 def _range_of(phase: PhaseTrajectory, name: str) -> np.ndarray:
     """Values of a state; two values a thousandth of its bounds apart if it moves less."""
     values, variable = phase[name], next(v for v in phase.state_variables if v.name == name)
-    least = LEAST * variable.span
+    least = 1e-3 * variable.span
     return values if np.ptp(values) >= least else np.array([0.0, least])
 
 
 def costate_ranges(trajectory: Trajectory, costates: Costates) -> dict[str | None, float]:
     """The least range in which the costate of each state is drawn, and the Hamiltonian (None): less is round-off."""
     phases = [phase for phase in trajectory.phases if has_length(trajectory, phase)]
-    worth = FLAT * max(_worth(phase, costates[phase.name]) for phase in phases)
+    # Two hundredths of what all costates are worth: less is round-off.
+    worth = 0.02 * max(_worth(phase, costates[phase.name]) for phase in phases)
     names = dict.fromkeys(name for phase in phases for name in costates[phase.name])
     ranges: dict[str | None, list[np.ndarray]] = {
         **{name: [_range_of(phase, name) for phase in phases if name in costates[phase.name]] for name in names},
@@ -228,8 +255,8 @@ def draw_panel(ax: Any, drawn: Sequence[Drawn], name: str, kind: str) -> None:
         ((min(phase.t0 for phase in phases), max(phase.tf for phase in phases)), lower, upper) for (lower, upper), phases in held.items()
     ]
     draw_limits(ax, np.concatenate(values), limits)
-    ax.set_ylabel(_beside(name, owners[0].unit))
-    ax.set_title("; ".join(dict.fromkeys(_range(owner) for owner in owners)), loc="right", fontsize=7, color=GREY, pad=2)
+    ax.set_ylabel(beside(name, owners[0].unit))
+    note_above(ax, "; ".join(dict.fromkeys(interval(owner.lower, owner.upper) for owner in owners)))
 
 
 def _dense(
@@ -248,95 +275,7 @@ def _dense(
     return np.concatenate(times), np.concatenate(values)
 
 
-def _range(limit: Variable | Limit) -> str:
-    """The bounds as text: in [0, 40], = 3, or the finite one alone."""
-    low, high = axis_number(limit.lower), axis_number(limit.upper)
-    if np.isinf(limit.lower):
-        return f"\N{LESS-THAN OR EQUAL TO} {high}"
-    if np.isinf(limit.upper):
-        return f"\N{GREATER-THAN OR EQUAL TO} {low}"
-    return f"= {low}" if limit.lower == limit.upper else f"in [{low}, {high}]"
-
-
-def _finish(figure: Any, grid: np.ndarray, used: Sequence[int], columns: int, trajectory: Trajectory, title: str) -> None:
-    """Draw the time axis below each column, the boundaries and names of the phases, and the title."""
-    unit = " | ".join(dict.fromkeys(phase.time_unit for phase in trajectory.phases))
-    for i, ax in ((i, grid[i]) for i in used):
-        for phase in trajectory.phases[1:]:
-            ax.axvline(phase.t0, color=GREY, lw=0.7, ls=":")
-        ax.tick_params(labelbottom=i + columns not in used)
-    figure.supxlabel(axis_label("time", unit), fontsize=9)
-    figure.align_ylabels()
-    ax = grid[0]
-    first, last = trajectory.phases[0].t0, max(phase.tf for phase in trajectory.phases)
-    margin = 0.015 * (last - first) or 1.0  # phases without duration are seen, too
-    ax.set_xlim(first - margin, last + margin)
-    if len(trajectory) > 1:
-        from matplotlib.lines import Line2D
-
-        names = [phase.name if has_length(trajectory, phase) else f"{phase.name} (no length)" for phase in trajectory.phases]
-        handles = [Line2D([], [], color=COLORS[k % len(COLORS)], marker=".", label=plain(name)) for k, name in enumerate(names)]
-        figure.legend(handles=handles, loc="outside upper right", ncols=min(len(handles), 6), frameon=False)
-    figure.suptitle(wrapped(plain(title), figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
-
-
-def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
-    """Axes, one for each state, control and path constraint, with the trajectories of some points over time.
-
-    Dashed lines are bounds and limits, as of one trajectory alone. A dot is the end of a phase that another one follows. Nodes are hollow
-    dots where a trajectory is not verified. Shorter trajectories are above longer ones. The legend has each point's number and objectives.
-    """
-    import matplotlib
-    from matplotlib.lines import Line2D
-
-    if not 1 <= len(points) <= len(COLORS):
-        raise ValueError(f"trajectories of one to {len(COLORS)} points can be told apart in a picture, not of {len(points)}")
-    without = [point.index for point in points if point.trajectory is None]
-    if without:
-        raise ValueError(f"point {without[0]} has no trajectory: its problem has none, or its evaluation failed")
-    drawn = [Drawn(point.trajectory, color, hollow(point)) for point, color in zip(points, COLORS, strict=False)]
-    over = sorted(drawn, key=lambda one: one.trajectory.phases[-1].tf, reverse=True)
-    panels = list(dict.fromkeys(panel for one in drawn for panel in quantities(one.trajectory)))
-    columns = 1 if len(panels) < 3 else 2 if len(panels) < 9 else 3
-    rows = -(-len(panels) // columns)
-    size = (PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.4 + 0.2 * len(points))
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
-        if figure is None:
-            figure = new_figure(*size)
-        else:
-            figure.set_size_inches(*size)
-        grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-        for ax, (name, kind) in zip(grid, panels, strict=False):
-            draw_panel(ax, over, name, kind)
-        for ax in grid[len(panels) :]:
-            ax.remove()
-        for i, ax in enumerate(grid[: len(panels)]):
-            ax.tick_params(labelbottom=i + columns >= len(panels))
-        phases = [phase for one in drawn for phase in one.trajectory.phases]
-        first, last = min(phase.t0 for phase in phases), max(phase.tf for phase in phases)
-        margin = 0.015 * (last - first) or 1.0
-        grid[0].set_xlim(first - margin, last + margin)
-        figure.supxlabel(axis_label("time", " | ".join(dict.fromkeys(phase.time_unit for phase in phases))), fontsize=9)
-        figure.align_ylabels()
-        named = [wrapped(plain(_words(point)), figure.get_figwidth() - 0.6, 8.0) for point in points]
-        lines = [Line2D([], [], color=one.color, lw=1.5, label=words) for one, words in zip(drawn, named, strict=True)]
-        figure.legend(handles=lines, loc="outside upper left", frameon=False)
-    return grid[: len(panels)]
-
-
-def _words(point: Any) -> str:
-    """The point's number, its objectives, and whether it is not feasible, not verified or not simulated."""
-    named = zip(point.goals, point.objectives.values(), strict=True)
-    values = ", ".join(f"{goal.name} {value:.5g} {raised(goal.unit)}".rstrip() for goal, value in named)
-    said = remark(point)
-    return f"#{point.index}: {values}{f'; {said}' if said else ''}"
-
-
 # For notebooks
-
-
-PANELS = 24
-"""Most panels of a picture: a point with more is shown by its table alone."""
 
 
 def point_html(point: Any) -> str:
@@ -353,7 +292,8 @@ def point_html(point: Any) -> str:
         about.append("parameters: " + ", ".join(f"{name} {value:.6g}" for name, value in point.parameters.items()))
     about += [point.note] if point.note else []
     picture, figure = b"", blank_figure()
-    if point.trajectory is not None and len(quantities(point.trajectory)) <= PANELS:
+    # A point with more panels is shown by its table alone.
+    if point.trajectory is not None and len(quantities(point.trajectory)) <= 24:
         draw_flight(point.trajectory, "", figure, hollow=hollow(point))
         picture = rendered(figure, "png", 55)
     elif not point.dynamic:

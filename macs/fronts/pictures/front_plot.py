@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from problems.compiled import Objective, Variable
+from problems.compiled import Objective
 
 from ...io.atomic import write_whole
 from ...io.text import counted, numbers
@@ -20,17 +20,21 @@ from .style import (
     NOT_FEASIBLE,
     NOT_SIMULATED,
     NOT_VERIFIED,
-    STYLE,
     axis_label,
     axis_number,
     better,
     blank_figure,
+    draw_hollow,
     draw_limits,
+    figure_title,
+    interval,
     kinds,
     new_figure,
-    plain,
+    note_above,
+    panel_grid,
     raised,
     rendered,
+    styled,
     title_and_legend,
     wrapped,
 )
@@ -39,11 +43,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-FEW = 100
-"""Other points up to this number are drawn as crosses."""
-
-
-SAME = 1e-9
+EQUAL_OBJECTIVES = 1e-9
 """Objectives that differ by less, of their size, are the same but for round-off."""
 
 
@@ -64,9 +64,7 @@ def save_picture(what: Any, path: str | PathLike[str], **how: Any) -> None:
 
 
 def _write(drawn: Callable[[], Any], path: str | PathLike[str]) -> None:
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with styled():
         figure = drawn()
     write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
 
@@ -90,14 +88,12 @@ def draw_front(front: Any, ax: Axes | None = None, marked: Sequence[int] = (), b
     Axes), more as parallel coordinates. Points that did not converge, and those that a simulation did not confirm, are hollow or broken
     lines; none of them is marked as best.
     """
-    import matplotlib
-
     if len(marked) > len(COLORS):
         raise ValueError(f"at most {len(COLORS)} points can be marked in a picture, not {len(marked)}")
     if beside and len(front.goals) != 2:
         raise ValueError(f"other points are drawn beside those of two objectives, not of {len(front.goals)}")
 
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with styled():
         if ax is None:
             ax = new_figure(*_size(front)).add_subplot()
         if len(front.goals) > 3:
@@ -112,7 +108,7 @@ def draw_front(front: Any, ax: Axes | None = None, marked: Sequence[int] = (), b
 def _draw_beside(ax: Any, beside: Mapping[str, Any]) -> None:
     """Draw other points: dots so small that many make a line, which may have gaps, or crosses if there are few."""
     for (name, values), color in zip(beside.items(), cycle(("black", GREY))):
-        many = len(values) > FEW
+        many = len(values) > 100
         look: dict[str, Any] = {"marker": "o", "ms": 0.9, "mew": 0.0} if many else {"marker": "x", "ms": 5.0}
         ax.plot(*np.asarray(values, dtype=float).T, ls="none", color=color, zorder=1, **look)
         ax.plot([], [], "-" if many else "x", color=color, lw=1.0, ms=5.0, label=name)
@@ -133,7 +129,7 @@ def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
         words = wrapped(front.message, 0.8 * ax.bbox.width / ax.figure.dpi)
         ax.text(0.5, 0.9, words, transform=ax.transAxes, ha="center", va="top", color=GREY)
         front = front if front.closest is None else front.closest.alone()
-    values, (good, apart, infeasible) = front.objectives, kinds(front)
+    values, (good, apart, _) = front.objectives, kinds(front)
     if values.shape[1] == 1:
         values = np.column_stack([np.arange(len(values)), values])
     goals = front.goals if len(front.goals) > 1 else (Objective("point"), *front.goals)
@@ -145,10 +141,7 @@ def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
     color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
     shades = _shades(values[good | apart, 2]) if third and (good | apart).any() else None
     ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color, norm=shades and shades.norm)
-    rims = shades.to_rgba(values[apart, 2]) if shades else COLORS[0]
-    for rows, name, edge in ((apart, NOT_VERIFIED, rims), (infeasible, NOT_FEASIBLE, GREY)):
-        if rows.any():
-            ax.scatter(*axes[:, rows], s=26, facecolors="none", edgecolors=edge, linewidths=0.9, zorder=2, label=name)
+    draw_hollow(ax, axes, front, 26, shades.to_rgba(values[apart, 2]) if shades else COLORS[0])
     if shades:
         ax.figure.colorbar(shades, ax=ax, label=better(goals[2]), pad=0.02).outline.set_visible(False)
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
@@ -175,7 +168,7 @@ def _about(values: np.ndarray) -> tuple[float, float] | None:
     """Ends of a range about values that are all the same but for round-off; None for others."""
     finite = values[np.isfinite(values)]
     size = float(np.abs(finite).max(initial=0.0))
-    if not len(finite) or np.ptp(finite) > SAME * size:
+    if not len(finite) or np.ptp(finite) > EQUAL_OBJECTIVES * size:
         return None
     half = 0.1 * size or 1.0
     return float(finite.min()) - half, float(finite.max()) + half
@@ -215,7 +208,7 @@ def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
         best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
     else:
         best = worst = np.zeros(F.shape[1])
-    same = worst - best <= SAME * np.maximum(np.abs(worst), np.abs(best))
+    same = worst - best <= EQUAL_OBJECTIVES * np.maximum(np.abs(worst), np.abs(best))
     height = np.where(same & np.isfinite(F), 1.0, 1.0 - (F - best) / np.where(same, 1.0, worst - best))
     shade = matplotlib.colormaps["viridis"]
     for row in height[good]:
@@ -243,63 +236,33 @@ def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
         ax.spines[side].set_visible(False)
 
 
-MOST = 30
-"""Variables that are drawn; of more, those that vary most within their bounds."""
-NEAR = 0.6
-"""Bounds are in the picture if this many times the range of the values contains them; the text above each panel always gives them."""
-
-
 def draw_designs(front: Any, title: str, figure: Any = None, marked: Sequence[int] = ()) -> np.ndarray:
-    """Axes, one for each variable, with its values over the first objective of all points.
+    """Axes, one for each variable, with its values over the first objective of all points: of more than 30, those that vary most.
 
     Dashed lines are its bounds. Colours are the second objective, if there is one. Points that are not feasible or not verified are hollow.
     """
-    import matplotlib
-
     decisions, variables, goals, J = front.decision, front.variables, front.goals, front.objectives
-    good, apart, infeasible = kinds(front)
-    names = _drawn(decisions, variables)
-    columns = 1 if len(names) < 3 else 2 if len(names) < 7 else 3
-    rows = -(-len(names) // columns)
-    size = (3.4 * columns + 0.8, 1.8 * rows + 0.7)
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
-        if figure is None:
-            figure = new_figure(*size)
-        else:
-            figure.set_size_inches(*size)
-        grid = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-        color: dict[str, Any] = {"c": J[good, 1], "cmap": "viridis"} if len(goals) > 1 else {"color": COLORS[0]}
-        drawn = None
-        for ax, k in zip(grid, names, strict=False):
+    varying = (np.ptp(decisions, axis=0) if len(decisions) else np.zeros(len(variables))) / np.array([v.span for v in variables])
+    drawn = sorted(np.argsort(-varying, kind="stable")[:30].tolist())
+    good = kinds(front)[0]
+    color: dict[str, Any] = {"c": J[good, 1], "cmap": "viridis"} if len(goals) > 1 else {"color": COLORS[0]}
+    with styled():
+        figure, axes = panel_grid(figure, [len(drawn)], panel=(3.4, 1.8), columns=1 if len(drawn) < 3 else 2 if len(drawn) < 7 else 3)
+        for ax, k in zip(axes, drawn, strict=True):
             values, variable = decisions[:, k], variables[k]
-            drawn = ax.scatter(J[good, 0], values[good], s=16, linewidths=0.3, edgecolors="white", zorder=3, **color)
-            for hollow, name, edge in ((apart, NOT_VERIFIED, COLORS[0]), (infeasible, NOT_FEASIBLE, GREY)):
-                if hollow.any():
-                    ax.scatter(J[hollow, 0], values[hollow], s=16, facecolors="none", edgecolors=edge, linewidths=0.8, zorder=2, label=name)
+            shades = ax.scatter(J[good, 0], values[good], s=16, linewidths=0.3, edgecolors="white", zorder=3, **color)
+            draw_hollow(ax, np.stack([J[:, 0], values]), front, 16)
             for i in marked:
                 ax.scatter(J[i, 0], values[i], s=70, facecolors="none", edgecolors=COLORS[1], linewidths=1.4, zorder=4)
-            draw_limits(ax, values, [(None, variable.lower, variable.upper)], NEAR, margin=0.08)
+            draw_limits(ax, values, [(None, variable.lower, variable.upper)], 0.6, margin=0.08)
             ax.set_ylabel(wrapped(axis_label(variable.name, variable.unit), 1.5))
-            ax.set_title(f"in [{axis_number(variable.lower)}, {axis_number(variable.upper)}]", loc="right", fontsize=7, color=GREY, pad=2)
-        for ax in grid[len(names) :]:
-            ax.remove()
-        used = grid[: len(names)]
-        for i, ax in enumerate(used):
-            ax.tick_params(labelbottom=i + columns >= len(used))
+            note_above(ax, interval(variable.lower, variable.upper))
         if len(goals) > 1 and good.any():
-            figure.colorbar(drawn, ax=list(used), label=axis_label(goals[1].name, goals[1].unit)).outline.set_visible(False)
-        handles, words = used[0].get_legend_handles_labels()
+            figure.colorbar(shades, ax=list(axes), label=axis_label(goals[1].name, goals[1].unit)).outline.set_visible(False)
+        handles, words = axes[0].get_legend_handles_labels()
         if handles:
             figure.legend(handles, words, loc="outside upper right", ncols=len(handles), frameon=False)
-        left_out = len(variables) - len(names)
-        text = f"{title}; {left_out} variables that vary less are left out" if left_out else title
-        figure.suptitle(wrapped(plain(text), figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
+        left_out = len(variables) - len(drawn)
+        figure_title(figure, f"{title}; {left_out} variables that vary less are left out" if left_out else title)
         figure.supxlabel(axis_label(goals[0].name, goals[0].unit), fontsize=9)
-    return used
-
-
-def _drawn(decisions: np.ndarray, variables: Sequence[Variable]) -> list[int]:
-    """The columns of the variables that are drawn, in their order."""
-    spans = np.array([v.span for v in variables])
-    varying = (np.ptp(decisions, axis=0) if len(decisions) else np.zeros(len(spans))) / spans
-    return sorted(np.argsort(-varying, kind="stable")[:MOST].tolist())
+    return axes

@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from os import PathLike
 from typing import Any
@@ -22,10 +23,6 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#88
 
 
 GREY = "#666666"
-
-
-LETTER = 0.6
-"""Width of a letter, of its size: more than that of most words, so that lines end before the picture does."""
 
 
 POWER = re.compile(r"\b(m|mm|cm|km|s|min|h|d|yr|ft|in|rad|deg|K|DU|TU|(?<!g )(?<!t )(?<!l )k?N|kg|J|W|Pa|kPa|V|A)\^?(-?\d)\b")
@@ -52,6 +49,15 @@ STYLE = {
     "axes.formatter.limits": (-4, 7),
     "axes.formatter.use_mathtext": True,
 }
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """A context in which figures have this style."""
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+        yield
 
 
 def new_figure(width: float, height: float) -> Any:
@@ -147,7 +153,8 @@ def axis_number(value: float) -> str:
 
 def wrapped(text: str, width: float, size: float = 9.0) -> str:
     """Text in lines of at most `width` inches in letters of `size` points, as wide as they are on average."""
-    return textwrap.fill(text, max(int(72.0 * width / (LETTER * size)), 1))
+    # A letter is taken to be 0.6 of its size wide: more than in most words, so that lines end before the picture does.
+    return textwrap.fill(text, max(int(72.0 * width / (0.6 * size)), 1))
 
 
 def better(goal: Objective) -> str:
@@ -202,13 +209,70 @@ def remark(point: Any) -> str:
     return "" if point.verified else NOT_VERIFIED
 
 
-# Vertical axes
+def draw_hollow(ax: Any, places: np.ndarray, front: Any, size: float, rims: Any = COLORS[0]) -> None:
+    """Draw the points that are not verified or not feasible as hollow dots at `places` (2 or 3, n)."""
+    _, apart, infeasible = kinds(front)
+    for rows, name, edge in ((apart, NOT_VERIFIED, rims), (infeasible, NOT_FEASIBLE, GREY)):
+        if rows.any():
+            look = {"facecolors": "none", "edgecolors": edge, "linewidths": 0.9}
+            ax.scatter(*places[:, rows], s=size, zorder=2, label=name, **look)
 
 
-OF_SIZE, OF_BOUNDS = 1e-4, 1e-6
-"""A quantity is constant if it varies by less than this part of its size, or of the span of its bounds: the latter is round-off."""
-SMALL = 0.05
-"""Part of the span of its bounds below which a constant is not drawn within these, unless it is zero: it could not be read."""
+# Panels, one above the other
+
+
+PANEL = (3.6, 1.75)
+"""Inches: width and height of a panel."""
+
+
+def panel_grid(
+    figure: Any, groups: Sequence[int], *, panel: tuple[float, float] = PANEL, columns: int | None = None, above: float = 0.6
+) -> tuple[Any, np.ndarray]:
+    """A figure, and the axes of its panels, which share the horizontal axis. Each group of so many panels begins a row; `above` are the
+    inches for titles and labels."""
+    columns = columns or (1 if groups[0] < 3 else 2 if groups[0] < 9 else 3)
+    rows = [-(-count // columns) for count in groups]
+    size = panel[0] * columns + 0.4, panel[1] * sum(rows) + above
+    if figure is None:
+        figure = new_figure(*size)
+    else:
+        figure.set_size_inches(*size)
+    grid = figure.subplots(sum(rows), columns, sharex=True, squeeze=False).ravel()
+    used = [sum(rows[:k]) * columns + i for k, count in enumerate(groups) for i in range(count)]
+    for ax in np.delete(grid, used):
+        ax.remove()
+    for i in used:
+        grid[i].tick_params(labelbottom=i + columns not in used)
+    return figure, grid[used]
+
+
+def figure_title(figure: Any, title: str) -> None:
+    """Write the title of a figure of several panels."""
+    figure.suptitle(wrapped(plain(title), figure.get_figwidth()), fontsize=9, x=0.01, ha="left")
+
+
+def note_above(ax: Any, text: str) -> None:
+    """Write a small remark above a panel, at its right."""
+    ax.set_title(text, loc="right", fontsize=7, color=GREY, pad=2)
+
+
+def beside(name: str, unit: str) -> str:
+    """The label of a vertical axis, in lines no longer than a panel is high."""
+    return wrapped(axis_label(name, unit), PANEL[1] - 0.25)
+
+
+def interval(lower: float, upper: float) -> str:
+    """Bounds as text: in [0, 40], = 3, or the finite one alone."""
+    low, high = axis_number(lower), axis_number(upper)
+    if np.isinf(lower):
+        return f"\N{LESS-THAN OR EQUAL TO} {high}"
+    if np.isinf(upper):
+        return f"\N{GREATER-THAN OR EQUAL TO} {low}"
+    return f"= {low}" if lower == upper else f"in [{low}, {high}]"
+
+
+ROUND_OFF = 1e-6
+"""A quantity that varies by less than this part of the span of its bounds is constant."""
 
 Limits = tuple[tuple[float, float] | None, float, float]
 """Between which places across they hold (None: all), and the lower and upper limit; infinite where there is none."""
@@ -241,7 +305,7 @@ def draw_limits(ax: Any, values: np.ndarray, limits: Sequence[Limits], reach: fl
 
 def is_constant(low: float, high: float, span: float) -> bool:
     """Whether values between these are those of a constant whose bounds have this span (0: none)."""
-    return high - low <= max(OF_SIZE * max(abs(low), abs(high)), OF_BOUNDS * span)
+    return high - low <= max(1e-4 * max(abs(low), abs(high)), ROUND_OFF * span)
 
 
 def _around(low: float, high: float, limits: Sequence[Limits]) -> tuple[float, float]:
@@ -249,7 +313,8 @@ def _around(low: float, high: float, limits: Sequence[Limits]) -> tuple[float, f
     size = max(abs(low), abs(high))
     both = [(lower, upper) for _, lower, upper in limits if np.isfinite(upper - lower) and lower < upper]
     span = max((upper - lower for lower, upper in both), default=0.0)
-    if both and (size >= SMALL * span or size <= OF_BOUNDS * span):
+    # One that is small beside its bounds could not be read within these, unless it is zero.
+    if both and (size >= 0.05 * span or size <= ROUND_OFF * span):
         return min(low, *(lower for lower, _ in both)), max(high, *(upper for _, upper in both))
     half = 0.1 * size or 1.0
     return low - half, high + half

@@ -26,8 +26,7 @@ from macs import MACS
 from macs.front import Front
 from macs.fronts import files
 from macs.fronts.columns import legal_names
-from macs.fronts.dataset import VERSION, group_names
-from macs.fronts.point import Point
+from macs.fronts.dataset import FORMAT_VERSION, group_names
 from macs.fronts.provenance import ProblemSource
 from macs.io.atomic import sealed, unsealed
 from problems.compiled import Variable
@@ -215,18 +214,11 @@ def test_states_may_have_any_name(tmp_path):
 
 
 def test_data_that_cannot_be_written_down_has_to_be_passed_again(tmp_path):
-    front = flights(1, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"table": np.arange(3.0)}))
+    front = flights(1, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"table": np.arange(50_000.0)}))
     front.save(tmp_path / "a.nc")
-    assert Front.load(tmp_path / "a.nc").source.data == {"table": [0, 1, 2]}
+    assert Front.load(tmp_path / "a.nc").source.data == {"table": list(range(50_000))}
     flights(1, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"f": print})).save(tmp_path / "a.nc")
     assert Front.load(tmp_path / "a.nc").source.address == ""
-
-
-def test_large_data_fits(tmp_path):
-    flights(1, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"table": list(range(50_000))})).save(
-        tmp_path / "a.nc"
-    )
-    assert len(Front.load(tmp_path / "a.nc").source.data["table"]) == 50_000
 
 
 # Writing
@@ -240,19 +232,15 @@ def test_saving_replaces_a_front_while_another_is_read_from_it(tmp_path):
     assert len(front) == 2 and len(Front.load(path)) == 3
 
 
-def test_a_missing_folder_is_named(tmp_path):
+def test_a_missing_folder_or_file_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"there is no file '.*nothing\.nc'"):
+        Front.load(tmp_path / "nothing.nc")
     with pytest.raises(FileNotFoundError, match=r"cannot write '.*front\.nc': there is no folder '.*nowhere'"):
         flights(1).save(tmp_path / "nowhere" / "front.nc")
     with pytest.raises(IsADirectoryError, match="it is a folder"):
         flights(1).save(tmp_path)
     with pytest.raises(FileNotFoundError, match="there is no folder"):
         flights(1).to_csv(tmp_path / "nowhere" / "front.csv")
-
-
-def test_a_folder_that_may_not_be_written_to_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("os.access", lambda path, mode: False)
-    with pytest.raises(PermissionError, match="not writable"):
-        flights(1).save(tmp_path / "front.nc")
 
 
 def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
@@ -324,11 +312,6 @@ def test_a_name_that_cannot_be_written_is_found_before_any_work(tmp_path, monkey
         flights(1).save(tmp_path / "file")
 
 
-def test_a_long_name_of_many_bytes_is_written(tmp_path):
-    flights(1).save(tmp_path / ("ü" * 120 + ".nc"))
-    assert len(list(tmp_path.iterdir())) == 1
-
-
 @pytest.mark.parametrize("step", ["write", "fsync", "replace"])
 def test_a_full_disk_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch, step):
     path = tmp_path / "front.nc"
@@ -375,11 +358,6 @@ def _full_file(path, mode):
 # Reading
 
 
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"there is no file '.*nothing\.nc'"):
-        Front.load(tmp_path / "nothing.nc")
-
-
 def test_what_is_no_ordinary_file_is_not_a_front(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "circle").symlink_to(tmp_path / "circle")
@@ -397,16 +375,6 @@ def test_what_is_no_ordinary_file_is_not_a_front(tmp_path):
     for path, why in paths.items():
         with pytest.raises(ValueError, match=rf"cannot be read: .*{why}"):
             Front.load(path)
-
-
-def test_a_file_that_may_not_be_read_is_named(tmp_path, monkeypatch):
-    def refuse(*_):
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    flights(1).save(tmp_path / "front.nc")
-    monkeypatch.setattr("os.open", refuse)
-    with pytest.raises(ValueError, match=r"front\.nc cannot be read: Permission denied"):
-        Front.load(tmp_path / "front.nc")
 
 
 def test_a_file_cut_anywhere_is_refused(tmp_path):
@@ -502,15 +470,6 @@ def test_an_older_format_is_not_believed_with_a_checksum_nor_this_one_without(tm
         (tmp_path / "front.nc").write_bytes(content)
         with pytest.raises(ValueError, match=why):
             Front.load(tmp_path / "front.nc")
-
-
-def test_each_point_is_asked_once_for_its_parameters(monkeypatch):
-    """Otherwise, the time to save a front grows with the square of their number."""
-    asked = []
-    parameters = Point.parameters.fget
-    monkeypatch.setattr(Point, "parameters", property(lambda point: asked.append(point.index) or parameters(point)))
-    files.to_bytes(black_box(4))
-    assert asked == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize("content", [b"hello\n", b"\x80\x04K\x01.", pickle.dumps({"F": 1}), b"CDF\x01\0\0\0\0", b"PK\3\4"])
@@ -633,23 +592,22 @@ class Replaced(Exception):  # noqa: N818 - carries the content of the file
 
 
 FORGERIES = {
-    "a later format": (put("@format_version", VERSION + 1), f"version {VERSION + 1}, this MACS reads up to version {VERSION}: update MACS"),
+    "a later format": (
+        put("@format_version", FORMAT_VERSION + 1),
+        f"version {FORMAT_VERSION + 1}, this MACS reads up to version {FORMAT_VERSION}: update MACS",
+    ),
     "no format": (put("@format_version", 0), "version 0"),
     "an array that is not known": (put("climb/extra", [1.0]), "array 'extra', which is not known"),
     "a group that is not known": (lambda file: file.create_group("extra"), "its groups are"),
     "no violations": (remove("violation"), "'violation' is missing"),
     "no phase": (remove("climb"), "its groups are"),
     "no attribute": (lambda file: file.attrs.__delitem__("message"), "'message' is missing"),
-    "an attribute of another kind": (put("@message", 3), "'message' is of another kind"),
     "no seed": (lambda file: file.attrs.__delitem__("seed"), "'seed' is missing"),
     "a negative count": (put("@evaluations", -1), "'evaluations' is no number of at least 0"),
-    "no JSON": (put("@solver", "{"), "'solver' is no JSON"),
     "JSON that never ends": (put("@solver", "[" * 100_000), "'solver' is no JSON"),
-    "JSON of another kind": (put("@solver", "[]"), "'solver' is not what it should be"),
     "a transcription that is none": (edit("transcription", 0, "3"), "'transcription' is not what it should be"),
     "another type": (put("violation", np.ones(2, dtype="f4")), "of type float32"),
     "another kind": (put("violation", np.ones(2, dtype="i8")), "'violation' has whole numbers, not numbers"),
-    "another rank": (put("violation", np.ones((2, 1))), "'violation' has 2 dimensions"),
     "texts of rank 2": (put("status", np.array([["a"], ["b"]], dtype=object), dtype=h5py.string_dtype()), "texts have 1"),
     "another length": (put("violation", np.ones(3)), "along 'point'"),
     "a compound": (put("violation", np.zeros(2, dtype=[("a", "f8"), ("b", "f8")])), "'violation' is of type"),
@@ -659,21 +617,14 @@ FORGERIES = {
     "a scale that is NaN": (edit("climb/state_scale", 1, np.nan), "'v' has a scale that is not above 0"),
     "a negative period": (edit("climb/control_period", 0, -1.0), "a period that is not above 0"),
     "two objectives of a name": (edit("objective", 1, "time"), "two objectives have the same name"),
-    "two states of a name": (edit("climb/state", 1, "h"), "two entries of 'state'"),
-    "two constraints of a name": (edit("constraint", 1, "climb.load"), "two entries of 'constraint'"),
     "places twice": (edit("place", (0, 1), 0), "'place' does not number"),
-    "places beyond": (edit("place", (0, 1), 2**31 - 1), "'place' does not number"),
-    "a negative number of nodes": (edit("climb/node_count", 0, -1), "'node_count' is not between"),
     "more nodes than there are": (edit("climb/node_count", 0, 10**9), "'node_count' is not between"),
-    "no element": (edit("climb/element_count", 0, 0), "'element_count' is not between"),
     "elements without ends": (edit("climb/element_count", 0, 1), "'edge_count' is not that of its elements"),
     "a phase that a point lacks": (edit("climb/node_count", slice(None), 0), "in some phases only"),
-    "no count": (remove("climb/edge_count"), "'edge_count' is missing"),
     "a basis that is none": (edit("climb/state_basis", 0, "fourier"), "there is no basis 'fourier'"),
     "no state": (remove("climb/h"), "'h' is missing"),
     "other points in a phase": (link("climb", other_climb), "phase 'climb' has 1 points, the front has 2"),
     "compressed": (put("violation", np.zeros(2), compression="gzip"), "compressed, in pieces or elsewhere"),
-    "in chunks": (claim("violation", (10**9,), chunks=(10**6,)), "compressed, in pieces or elsewhere"),
     "filled": (claim("violation", (10**9,)), "but 0 bytes are stored"),
     "long without an entry": (claim("objectives", (10**12, 0), chunks=(1, 1), maxshape=(None, None)), "but 0 bytes are stored"),
     "in another file": (claim("violation", (2,), external=[("/etc/hostname", 0, 16)]), "compressed, in pieces or elsewhere"),
@@ -681,7 +632,6 @@ FORGERIES = {
     "a soft link": (link("violation", h5py.SoftLink("/optimality")), "'violation' is a link to another place"),
     "a link to another file": (link("violation", h5py.ExternalLink("other.nc", "/violation")), "'violation' is a link to another place"),
     "a circle of groups": (link("_closest", lambda file: file["/"]), "groups at more than"),
-    "a text of variable length": (lambda file: file.attrs.create("message", "all is well"), "'message' is of another kind"),
     "a text that is longer than the file": (lambda file: claim_length(file), "'note' refers to a text that is not there"),
     "many references to one text": (long_texts, "has more content than the file has bytes"),
     "two points closest": (lambda file: copy_root(file), "the closest point is one, not 2"),

@@ -25,12 +25,6 @@ def test_a_color_for_each_trajectory_in_every_panel():
     assert np.isclose(np.nanmax(np.concatenate(drawn)), max(ends))
 
 
-def test_limits_are_drawn_once_where_both_have_them():
-    axes = flights(5).plot_trajectories([0, 4])
-    dashed = [line for line in axes[2].lines if line.get_linestyle() == "--"]
-    assert sorted(line.get_ydata()[0] for line in dashed) == [-1.0, 1.0]
-
-
 def test_dots_are_ends_of_phases_and_hollow_nodes_of_what_is_not_verified():
     axes = marked(flights(3), [True, False, True]).plot_trajectories([0, 1])
     dots = [line for line in axes[0].lines if line.get_marker() == "o"]
@@ -52,9 +46,11 @@ def test_dots_are_ends_of_phases_and_hollow_nodes_of_what_is_not_verified():
 def test_what_cannot_be_drawn_is_said(front, points, said):
     with pytest.raises(ValueError, match=said):
         front.plot_trajectories(points)
+    with pytest.raises(ValueError, match="at most 7"):
+        flights(9).plot(marked=range(8))
 
 
-@pytest.mark.parametrize("objectives", [1, 2, 3, 4])
+@pytest.mark.parametrize("objectives", [2, 4])
 def test_marked_points_have_the_colors_of_their_trajectories(objectives):
     front = black_box(6, objectives)
     ax = front.plot(marked=[1, -1])
@@ -67,11 +63,6 @@ def test_marked_points_have_the_colors_of_their_trajectories(objectives):
         drawn = [one for one in ax.collections if one.get_label() in words]
         assert [to_hex(one.get_edgecolor()[0]).upper() for one in drawn] == list(COLORS[:2])
         assert np.array_equal(drawn[1].get_offsets()[0][-1], front.objectives[-1, min(objectives - 1, 1)])
-
-
-def test_too_many_marks_are_refused():
-    with pytest.raises(ValueError, match="at most 7"):
-        flights(9).plot(marked=range(8))
 
 
 def test_other_points_are_drawn_beside_those_of_two_objectives():
@@ -93,9 +84,3 @@ def test_a_shorter_trajectory_is_above_a_longer_one():
     ax = front.plot_trajectories([short, long])[0]
     lines = [to_hex(line.get_color()).upper() for line in ax.lines if line.get_linestyle() == "-"]
     assert lines.index(COLORS[1]) < lines.index(COLORS[0])
-
-
-def test_parallel_coordinates_of_one_verified_point_have_a_range():
-    F = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 4.0, 2.0, 3.0], [3.0, 2.0, 4.0, 1.0]])
-    ax = marked(black_box(3, 4, F=F), [False, True, False]).plot()
-    assert [text.get_text() for text in ax.texts] == ["0", "3", "0", "4", "0", "4", "0", "3"]

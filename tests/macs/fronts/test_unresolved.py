@@ -25,7 +25,7 @@ def solved(name: str, method=COARSE) -> tuple[Front, float]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["car", "rocket", "free_flying_robot", "tumour", "two_link_arm", "reorientation"])
+@pytest.mark.parametrize("name", ["car", "rocket", "tumour"])
 def test_it_is_said_where_the_optimum_is_missed(name):
     front, error = solved(name)
     assert front.verified.all() and error > 5e-4
@@ -33,27 +33,17 @@ def test_it_is_said_where_the_optimum_is_missed(name):
     assert line.startswith("On the mesh of point 0 ") and line.endswith("front.refine_mesh() finds meshes that are nearer to that.")
 
 
-@pytest.mark.parametrize("name", ["linear_tangent", "zermelo", "hanging_chain", "stirred_tank"])
+@pytest.mark.parametrize("name", ["linear_tangent", "zermelo", "stirred_tank"])
 def test_nothing_is_said_where_a_coarse_mesh_does(name):
     front, error = solved(name)
     assert front.verified.all() and error < 1e-4 and SAID not in front.table()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["car", "moon_landing", "bryson_denham", "van_der_pol", "tumour", "catalyst_mixing"])
+@pytest.mark.parametrize("name", ["car", "bryson_denham", "catalyst_mixing"])
 def test_nothing_is_said_on_the_mesh_that_is_found(name):
     front, error = solved(name, None)
     assert front.verified.all() and error < 5e-4 and SAID not in front.table()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["car", "tumour"])
-def test_what_is_said_to_help_helps(name):
-    front, error = solved(name)
-    assert SAID in front.table()
-    refined = front.refine_mesh()
-    known = published(name)[0]
-    assert SAID not in refined.table() and abs(known.error(refined[0].objectives[known.objective])) < 0.1 * error
 
 
 def test_only_points_of_dfet_that_miss_nothing_are_named():
@@ -78,40 +68,9 @@ def test_a_hamiltonian_that_need_not_be_constant_does_not_count():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("elements", [4, 8])
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
-@pytest.mark.parametrize(
-    "name",
-    [
-        "aly_chan",
-        "brachistochrone",
-        "breakwell",
-        "bryson_denham",
-        "car",
-        "catalyst_mixing",
-        "crane",
-        "dubins",
-        "f8",
-        "free_flying_robot",
-        "hang_glider",
-        "hanging_chain",
-        "hypersensitive",
-        "jacobson",
-        "linear_tangent",
-        "lotka_fishing",
-        "moon_landing",
-        "rayleigh",
-        "reorientation",
-        "robot_arm",
-        "rocket",
-        "stirred_tank",
-        "tumour",
-        "two_link_arm",
-        "van_der_pol",
-        "zermelo",
-    ],
-)
-def test_what_is_said_is_true_on_all_meshes(name, basis, elements):
-    front, error = solved(name, DFET(elements, 3, basis=basis))
+@pytest.mark.parametrize("name", ["brachistochrone", "crane", "f8", "hang_glider", "jacobson", "rayleigh", "robot_arm", "stirred_tank"])
+def test_what_is_said_is_true_on_all_meshes(name, basis):
+    front, error = solved(name, DFET(8, 3, basis=basis))
     if front.status[0] == "converged" and SAID in front.table():
         assert error > 5e-4
