@@ -22,10 +22,9 @@ from .batch.terms import INNER, check_inner, sampling, written
 from .execution.task import Payload, Task
 from .files import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
 from .measures.references import ReferenceKey, check_reference
-from .report.changed.data import check as check_nominal
-from .report.changed.dispersions import check as check_dispersions
-from .report.goal import Goal
+from .report.goal import StatedGoal
 from .report.published import check_against
+from .report.sensitivity import check_dispersions, check_nominal
 
 if TYPE_CHECKING:
     from .report.report import Report
@@ -86,13 +85,13 @@ class Study:
     paper : sequence of mappings
         Published tables to print beside ours; see `report.published`.
     goal : mapping, optional
-        Of which objective reports draw the goal attainment, between which values; see `report.goal.Goal`.
+        Of which objective reports draw the goal attainment, between which values; see `report.goal.StatedGoal`.
     nominal : str, optional
         Label of the problem whose front reports simulate under the data of all others, which have the same variables and objectives; see
-        `report.changed.data`.
+        `report.sensitivity`.
     dispersions : mapping, optional
         Under which reports fly the points of every front, where the case knows how: settings of the case's own, such as `cases` and `seed`;
-        see `report.changed.dispersions`.
+        see `report.sensitivity`.
     flights : bool, default True
         Whether reports show the flights that stand for each front.
     note : str
@@ -173,7 +172,7 @@ class Study:
             if self.reference is not None:
                 check_reference(self.reference, stated)
             if self.goal is not None:
-                Goal.of(self.goal, stated)
+                StatedGoal.of(self.goal, stated)
             if self.nominal is not None:
                 check_nominal(self.nominal, stated)
             if self.dispersions is not None:

@@ -14,14 +14,12 @@ from math import comb
 
 import numpy as np
 
-SMALL, MEDIUM, LARGE = 0.56, 0.64, 0.71
-"""From which A12 an effect is called so (Vargha and Delaney 2000)."""
 ALPHA = 0.05
-"""A pair whose samples are too few for any p below this level has a note."""
+"""Level of significance. A pair whose samples are too few for any p below it has a note."""
 
 
 @dataclass(frozen=True)
-class Summary:
+class SampleSummary:
     """A sample in numbers."""
 
     count: int  # count, failures: Runs, and how many of them failed
@@ -60,13 +58,13 @@ class Overall:
     ranks: Mapping[str, float]
 
 
-def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False) -> Summary:
-    """The numbers of a sample (n,), n >= 1; see `Summary`. One run has a mean, but no variance."""
+def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False) -> SampleSummary:
+    """The numbers of a sample (n,), n >= 1; see `SampleSummary`. One run has a mean, but no variance."""
     costs = _costs(values, larger, "the sample")
     sign = -1.0 if larger else 1.0
     good = sign * costs[np.isfinite(costs)]
     lower, upper = sorted(sign * _quantile(costs, share) for share in (0.25, 0.75))
-    return Summary(
+    return SampleSummary(
         count=len(costs),
         failures=len(costs) - len(good),
         mean=float(good.mean()) if len(good) else np.nan,
@@ -124,10 +122,10 @@ def a12(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, *, lar
 
 
 def effect(a12: float) -> str:
-    """The usual word for an effect of this size, in either direction."""
+    """The usual word for an effect of this size, in either direction, with the thresholds of Vargha and Delaney 2000."""
     # As far from one half, whatever the side; rounding must not take the name from a value on the border.
     size = max(a12, 1.0 - a12) + 1e-12
-    return "large" if size >= LARGE else "medium" if size >= MEDIUM else "small" if size >= SMALL else "negligible"
+    return next((word for least, word in ((0.71, "large"), (0.64, "medium"), (0.56, "small")) if size >= least), "negligible")
 
 
 def holm(p: Sequence[float] | np.ndarray) -> np.ndarray:

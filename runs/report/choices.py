@@ -15,7 +15,7 @@ from macs.preferences import FuzzySatisfactory, Preference, Ranges, from_dict
 from macs.preferences.pictures import draw_degrees
 
 from .comparison import Comparison
-from .flight_plots import flights_figure
+from .flights import flights_figure
 from .plots import COLUMN, PAGE, legend, new_figure, style
 from .tables import Cell, Head, Table, table
 
@@ -27,13 +27,11 @@ if TYPE_CHECKING:
 DECIDES = "Decide"
 """The solver that chooses, by the name that cells record."""
 SIDE_BY_SIDE = 5
-"""Most flights of one figure, and most choices of one figure of degrees."""
-LEAST = 3
-"""Choices with different lambda that make a line."""
+"""Most choices of one figure, of degrees or of flights: more would be too narrow on a page."""
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class RunChoice:
     """One choice of a run."""
 
     solver: str
@@ -50,7 +48,7 @@ class Chosen:
         return (by or self.preference).degrees(self.point.goals, ranges or self.ranges, self.objectives[None])[0]
 
 
-def chosen(comparison: Comparison) -> list[Chosen]:
+def chosen(comparison: Comparison) -> list[RunChoice]:
     """All choices of a comparison, solver by solver and run by run. Empty where nothing was chosen."""
     found = []
     for solver, runs in comparison.runs.items():
@@ -64,7 +62,7 @@ def chosen(comparison: Comparison) -> list[Chosen]:
                 name = about["label"] if len(runs) == 1 else f"{about['label']} (run {run.number})"
                 made = from_dict(about["preference"])
                 J = np.array(list(values.values()))
-                found.append(Chosen(solver, name, point, J, made, ranges, about["steps"], about["message"]))
+                found.append(RunChoice(solver, name, point, J, made, ranges, about["steps"], about["message"]))
     return found
 
 
@@ -122,7 +120,7 @@ def choices_figures(comparison: Comparison) -> dict[str, Figure]:
     return found
 
 
-def lambda_figures(every: Sequence[Chosen]) -> list[Figure]:
+def lambda_figures(every: Sequence[RunChoice]) -> list[Figure]:
     """Memberships and kappa over lambda, a figure for each order of priority of which there are at least three choices."""
     by_order: dict[Any, dict[float, np.ndarray]] = {}
     for one in every:
@@ -133,7 +131,7 @@ def lambda_figures(every: Sequence[Chosen]) -> list[Figure]:
             line.setdefault(preference.regulating, np.concatenate([one.degrees(), kappa]))
     found = []
     for priorities, values in by_order.items():
-        if len(values) < LEAST:
+        if len(values) < 3:
             continue
         weights = sorted(values)
         with style():
@@ -149,7 +147,7 @@ def lambda_figures(every: Sequence[Chosen]) -> list[Figure]:
     return found
 
 
-def degrees_figure(every: Sequence[Chosen], by: Preference | None = None) -> Figure:
+def degrees_figure(every: Sequence[RunChoice], by: Preference | None = None) -> Figure:
     """Degrees of some choices as bars beside each other, by the preference of the first unless another is given."""
     by, goals = by or every[0].preference, every[0].point.goals
     with style():
@@ -162,7 +160,7 @@ def degrees_figure(every: Sequence[Chosen], by: Preference | None = None) -> Fig
     return figure
 
 
-def _parts(every: Sequence[Chosen]) -> list[Sequence[Chosen]]:
+def _parts(every: Sequence[RunChoice]) -> list[Sequence[RunChoice]]:
     return [every[k : k + SIDE_BY_SIDE] for k in range(0, len(every), SIDE_BY_SIDE)]
 
 
@@ -182,7 +180,7 @@ def _verified(point: Point) -> str:
     return "yes" if point.verified else "-" if point.verified is None else "no"
 
 
-def _measures(every: Sequence[Chosen]) -> str:
+def _measures(every: Sequence[RunChoice]) -> str:
     """The ranges by which objectives were normalised, solver by solver."""
     words = []
     for solver in dict.fromkeys(one.solver for one in every):

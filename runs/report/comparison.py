@@ -126,6 +126,11 @@ class Comparison:
         runs = {solver: [*fronts, *[nothing] * self.failures.get(solver, 0)] for solver, fronts in self.fronts.items()}
         return {solver: fronts for solver, fronts in runs.items() if any(map(len, fronts))}
 
+    def merged(self, solver: str) -> Front | None:
+        """The front of all runs of a solver together; None if it found no point."""
+        fronts = [front for front in self.fronts[solver] if len(front)]
+        return Front.merge(fronts) if len(fronts) > 1 else fronts[0] if fronts else None
+
     def only(self, solver: str) -> Comparison:
         """The same of one solver alone."""
         return replace(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..measures.indicators import Scale
-from ..measures.statistics import PairTest, overall, pairwise, summarise
+from ..measures.statistics import ALPHA, PairTest, overall, pairwise, summarise
 from .comparison import CHARGED, Charge, Comparison, samples, spent
 from .tables import Cell, Head, Table, table
 
@@ -142,5 +142,5 @@ def overall_table(samples: Samples, *, caption: str = "") -> Table:
     return table(["indicator", "statistic", "p", *(f"rank of {name}" for name in names)], rows, caption, [note])
 
 
-def _better(c: PairTest, alpha: float = 0.05) -> str:
-    return "neither" if c.p_holm > alpha else c.first if c.a12 > 0.5 else c.second
+def _better(c: PairTest) -> str:
+    return "neither" if c.p_holm > ALPHA else c.first if c.a12 > 0.5 else c.second

@@ -1,4 +1,4 @@
-"""Goal attainment: how far the best value of one objective has come from a bad to a good one, over the evaluations of every run.
+"""StatedGoal attainment: how far the best value of one objective has come from a bad to a good one, over the evaluations of every run.
 
 mu = 1 - (J - J*) / (Jmax - J*), section VI C of Chai et al., "Solving multiobjective constrained trajectory optimization problem by an
 extended evolutionary algorithm", IEEE Transactions on Cybernetics 50(4), 2020; of whichever sense: J* is the good value, Jmax the bad one.
@@ -35,7 +35,7 @@ NEVER = (np.array([0.0]), np.array([np.nan]))
 Share = Annotated[float, Meta(gt=0, le=1, description="a number above 0 and at most 1")]
 
 
-class Goal(Section):
+class StatedGoal(Section):
     """The table `[goal]` of a study."""
 
     objective: Annotated[str, Meta(description="the name of an objective")]
@@ -49,10 +49,10 @@ class Goal(Section):
             raise ValueError(f"best and worst of '{self.objective}' are both {self.best:g}: they must differ")
 
     @classmethod
-    def of(cls, given: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem]) -> Goal:
+    def of(cls, given: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem]) -> StatedGoal:
         """The goal that a study states for problems by label. Raises ValueError that names the key that is wrong."""
         with errors_begin_with("goal"):
-            goal: Goal = checked(given, cls)
+            goal: StatedGoal = checked(given, cls)
             for name, problem in problems.items():
                 known = {one.name: one for one in problem.goals}
                 with errors_begin_with(f"problem '{name}'"):
@@ -89,7 +89,7 @@ class GoalAttainment:
     """The attainment of the goal on one problem."""
 
     problem: str  # its label
-    goal: Goal
+    goal: StatedGoal
     objective: Objective
     histories: Mapping[tuple[str, str], Sequence[History]]  # of failed runs, too, which attain nothing
     verified: Mapping[tuple[str, str], Sequence[float]]  # of failed runs, too. Empty where points are not simulated.
@@ -140,7 +140,7 @@ def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]
     no goal."""
     if study.get("goal") is None:
         return []
-    goal, verify = Goal.of(study["goal"], {}), study.get("verify")
+    goal, verify = StatedGoal.of(study["goal"], {}), study.get("verify")
     found = []
     for problem in dict.fromkeys(comparison.problem for comparison in comparisons):
         here = [comparison for comparison in comparisons if comparison.problem == problem]

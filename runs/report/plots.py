@@ -30,10 +30,6 @@ PAPER: dict[str, Any] = {
     **dict.fromkeys(("axes.linewidth", "xtick.major.width", "ytick.major.width"), 0.6),
     "legend.handlelength": 1.6,
 }
-TICKS = 0.3
-"""Inches beside a panel that the numbers on its axis take."""
-LABEL = 0.6
-"""Part of the width of a panel that a line of text beside it may take, so that it leaves room for its neighbours and powers of ten."""
 MARKERS = "o^sDvPX*"
 """One more than there are colours, so that no two of many solvers look alike."""
 
@@ -53,7 +49,8 @@ def front_figure(
     pairs = list(combinations(range(m), 2))
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
-    room = LABEL * (COLUMN if m == 2 else PAGE / 3.0)
+    # A label beside a panel leaves room for its neighbours and powers of ten.
+    room = 0.6 * (COLUMN if m == 2 else PAGE / 3.0)
     with style():
         figure = new_figure(COLUMN if m == 2 else PAGE, 2.7 if m == 2 else 2.3 * rows + 0.3)
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
@@ -99,7 +96,7 @@ def attainment_figure(
     with style():
         figure = new_figure(COLUMN if columns == 1 else PAGE, 2.6 * rows)
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
-        width = (COLUMN if columns == 1 else PAGE) / columns - TICKS
+        width = (COLUMN if columns == 1 else PAGE) / columns - 0.3  # inches for the numbers of the axis
         for k, (ax, (solver, surface)) in enumerate(zip(grid, surfaces.items(), strict=False)):
             if reference is not None:
                 _draw_truth(ax, truth(reference, goals), signs, (0, 1), truth_name)

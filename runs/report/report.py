@@ -22,16 +22,15 @@ from ..batch.store import Store
 from ..files import Flag, Text, check_trusted, checked, errors_begin_with
 from ..measures.attainment import attainment
 from ..measures.references import ReferenceKey, read, reference_addresses
-from .changed.data import ChangedData, changed_data
-from .changed.dispersions import DispersedFront, dispersed_fronts
 from .choices import choices_figures, choices_tables, only_choices
 from .comparison import AXES, CHARGED, Charge, Comparison, comparisons, histories, in_steps
 from .comparison_tables import claims_tables, cost_tables, indicator_tables
-from .flights import Designs, Flights
-from .goal import Goal, GoalAttainment, goal_attainments
+from .flights import Flights, VariablesAlongFront
+from .goal import GoalAttainment, StatedGoal, goal_attainments
 from .page import Page
 from .plots import attainment_figure, convergence_figure, front_figure
 from .published import papers, published_tables, with_count
+from .sensitivity import ChangedData, DispersedFront, changed_data, dispersed_fronts
 from .tables import Table
 
 if TYPE_CHECKING:
@@ -90,7 +89,7 @@ def report(
         keys = checked({key: study[key] for key in ReportKeys.__struct_fields__ if key in study}, ReportKeys)
         papers(study.get("paper") or [])
         if study.get("goal") is not None:
-            Goal.of(study["goal"], {})
+            StatedGoal.of(study["goal"], {})
         for address in reference_addresses(keys.reference):
             check_trusted(address, trust, "it")
     found = comparisons(store, {})
@@ -117,9 +116,9 @@ def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, 
     """The tables of a comparison as text, written to files with its figures."""
     tables = tables_of(comparison, study)
     figures = _figures(comparison) if drawn else {}
-    shown: Flights | Designs | None = None
+    shown: Flights | VariablesAlongFront | None = None
     if study.get("flights", True):
-        shown = Flights.of(comparison) or Designs.of(comparison)
+        shown = Flights.of(comparison) or VariablesAlongFront.of(comparison)
     if shown is not None:
         tables["representatives"] = shown.table()
         figures |= shown.figures() if drawn else {}

@@ -14,10 +14,6 @@ import numpy as np
 from macs.io.atomic import write_whole
 from macs.io.text import label, text_table
 
-COUNTED = 1e9
-"""Whole numbers below are written in full."""
-BAR = r"\|"
-"""A bar within a cell of Markdown."""
 Cell = str | float | int | None
 """An entry of a table: text, a number, or None if there is none."""
 
@@ -106,7 +102,7 @@ class Table:
         cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
         rule = [":---" if left else "---:" for left in self._left()]
         rows = [heads, rule, *cells]
-        lines = [f"| {' | '.join(cell.replace('|', BAR) for cell in row)} |" for row in rows]
+        lines = ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in rows]
         above = [f"**{self.caption}**", ""] if self.caption else []
         return "\n".join([*above, *lines, *(line for note in self.notes for line in ("", note))]) + "\n"
 
@@ -144,7 +140,7 @@ def short(value: float, digits: int = 3) -> str:
         return "inf" if value > 0 else "-inf"
     if value == 0.0:
         return "0"
-    if 1e5 <= abs(value) < COUNTED and value == np.rint(value):
+    if 1e5 <= abs(value) < 1e9 and value == np.rint(value):
         return f"{value:.0f}"
     rounded = float(f"{value:.{digits - 1}e}")
     if not 1e-3 <= abs(rounded) < 1e5:

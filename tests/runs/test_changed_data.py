@@ -14,9 +14,9 @@ from macs import NSGA2, Front
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.report.changed.data import MANY, SIMULATED, ChangedData, changed_data, changed_figure
 from runs.report.comparison import comparisons
 from runs.report.report import report
+from runs.report.sensitivity import LOOKS, SIMULATED_POINTS, ChangedData, changed_data, changed_figure
 
 CART = '''
 from problems import Problem
@@ -85,7 +85,7 @@ def rows(changed: ChangedData, name: str) -> list[dict[str, str]]:
 @pytest.mark.slow
 def test_shifts_are_those_of_the_same_flights(folder, changed):
     light = union(folder, "light")
-    assert 5 < len(light) <= MANY
+    assert 5 < len(light) <= SIMULATED_POINTS
     speeds = np.array([point.trajectory["run"]["v"][-1] for point in light])
     distances = light.objectives[:, 0]
     told = {row["data"]: row for row in rows(changed, "changed-data")}
@@ -154,7 +154,7 @@ def test_of_many_objectives_a_row_for_each_data(tmp_path):
     assert [ax.get_title("left") for ax in figure.axes] == ["4"] * 3 + ["5"] * 3
     alone = [comparison for comparison in comparisons(Store.open(tmp_path / "out", trust=True), {}) if comparison.problem == "2"]
     assert [one.figures() for one in changed_data(alone, {"nominal": "2"})] == [{}], "only the nominal front: nothing to draw"
-    marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == SIMULATED["mfc"]]
+    marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == LOOKS["simulated under these data"]["mfc"]]
     assert len(marks) == 1 and len(marks[0].get_xdata()) == len(found.changes[0].nominal)
     assert [ax.get_xlabel() for ax in figure.axes[:3]] == [""] * 3 and "distance" in figure.axes[5].get_xlabel()
 

@@ -13,10 +13,10 @@ from problems import load
 from problems.cases.aerocapture import coupled
 from runs import Study
 from runs.batch.store import Store
-from runs.report.changed import dispersions
-from runs.report.changed.dispersions import DispersedFront, dispersed_fronts
+from runs.report import sensitivity
 from runs.report.comparison import comparisons
 from runs.report.report import report
+from runs.report.sensitivity import DispersedFront, dispersed_fronts
 
 GIVEN = {"cases": 25, "seed": 4, "density": 0.05}
 
@@ -35,7 +35,7 @@ def study(**changed) -> Study:
 def few():
     """Three points of each front."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dispersions, "MANY", 3)
+        patch.setattr(sensitivity, "DISPERSED_POINTS", 3)
         yield
 
 

@@ -1,4 +1,4 @@
-"""Goal attainment: the formula, its history over runs, and what reports show of it."""
+"""StatedGoal attainment: the formula, its history over runs, and what reports show of it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from runs.batch.cells import Cell
 from runs.batch.store import StoredRun
 from runs.cli import main
 from runs.report.comparison import Comparison
-from runs.report.goal import Goal, GoalAttainment, goal_attainments
+from runs.report.goal import GoalAttainment, StatedGoal, goal_attainments
 from runs.report.report import report
 
 GOALS = (Objective("cost", unit="kg"), Objective("range", unit="km", sense="maximize"))
@@ -53,17 +53,17 @@ def rows(found: GoalAttainment) -> list[dict[str, str]]:
 
 
 def test_one_at_the_best_nothing_at_the_worst():
-    goal = Goal(**COST)
+    goal = StatedGoal(**COST)
     np.testing.assert_allclose(goal.attainment(np.array([10.0, 6.0, 2.0, 18.0, np.nan])), [0.0, 0.5, 1.0, -1.0, np.nan])
-    np.testing.assert_allclose(Goal(**RANGE).attainment(np.array([0.0, 25.0, 50.0, 60.0])), [0.0, 0.5, 1.0, 1.2])
+    np.testing.assert_allclose(StatedGoal(**RANGE).attainment(np.array([0.0, 25.0, 50.0, 60.0])), [0.0, 0.5, 1.0, 1.2])
 
 
 def test_of_the_best_so_far_from_the_first_feasible_point_on():
-    found = [Goal(**COST).history(one, GOALS) for one in RUNS]
+    found = [StatedGoal(**COST).history(one, GOALS) for one in RUNS]
     for x, _ in found:
         np.testing.assert_array_equal(x, COUNTS)
     np.testing.assert_allclose([y for _, y in found], [[0, 0.5, 0.875], [np.nan, 0.75, 1.0], [0.75, 0.75, 0.75]])
-    _, y = Goal(**RANGE).history(RUNS[0], GOALS)
+    _, y = StatedGoal(**RANGE).history(RUNS[0], GOALS)
     np.testing.assert_allclose(y, [0.2, 0.6, 1.0])
 
 

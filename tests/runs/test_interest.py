@@ -7,7 +7,7 @@ from choices import plain_front
 from macs.preferences import PhysicalProgramming, ReferencePoint, Smaller
 from macs.search.guide import PART
 from problems.compiled import Objective
-from runs.measures.interest import Interest
+from runs.bench.prefer import Interest
 
 GOALS = [Objective("a"), Objective("b")]
 EVENLY = ReferencePoint({"a": 0.0, "b": 0.0}, augmentation=0.0)

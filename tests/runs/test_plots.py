@@ -13,7 +13,7 @@ from synthetic_fronts import flights
 from problems.compiled import Objective
 from runs.measures.attainment import attainment
 from runs.measures.references import foreign
-from runs.report.flight_plots import flights_figure, paths_figure, representatives
+from runs.report.flights import flights_figure, paths_figure, representatives
 from runs.report.plots import attainment_figure, convergence_figure, front_figure, legend, new_figure
 
 GOALS = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
@@ -26,7 +26,7 @@ TRUTH = np.column_stack([np.linspace(1, 3, 201), np.linspace(1.5, 3.5, 201)])
 @pytest.mark.slow
 def test_nothing_heavy_is_imported_before_it_is_used():
     code = (
-        "import sys, runs.report.plots, runs.report.flight_plots, runs.report.comparison_tables\n"
+        "import sys, runs.report.plots, runs.report.flights, runs.report.comparison_tables\n"
         "import runs.measures.references, runs.measures.attainment\n"
         "heavy = [m for m in ('matplotlib', 'scipy.stats', 'xarray', 'pymoo') if m in sys.modules]\n"
         "sys.exit(str(heavy) if heavy else 0)"
