@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from itertools import product
 from typing import Any, ClassVar
 
@@ -59,7 +59,7 @@ class Decide(GradientSolver):
             raise ValueError('Decide: choices must be a table of preferences by label, {label: {"method": ..., "settings": ...}}')
         object.__setattr__(self, "choices", {label: _plain(label, one) for label, one in self.choices.items()})
         if self.ranges is not None:
-            object.__setattr__(self, "ranges", _data(_ranges(self.ranges)))
+            object.__setattr__(self, "ranges", _ranges(self.ranges).to_dict())
         list(self.preferences())
 
     def preferences(self) -> Iterator[tuple[str, Preference, bool]]:
@@ -106,8 +106,9 @@ class Decide(GradientSolver):
             stats["verify"] = terms["verify"]
         points = Points.concatenate([choice.point.alone() for _, choice in found])
         about = [_about(label, choice) for label, choice in found]
+        message = "; ".join(f"{label}: {choice.message}" for label, choice in found if choice.message)
         return Front.of(
-            points.replace(solver=self.about(), stats={**stats, "ranges": _data(solver.ranges), "choices": about}, message=_message(found))
+            points.replace(solver=self.about(), stats={**stats, "ranges": solver.ranges.to_dict(), "choices": about}, message=message)
         )
 
     def remeshed(self, front: Front, time_limit: float | None, progress: bool | None) -> Front:
@@ -147,24 +148,9 @@ def _about(label: str, choice: Choice) -> dict[str, Any]:
         "preference": to_dict(choice.preference),
         "degrees": dict(choice.degrees),
         "values": list(choice.values),
-        "steps": [
-            {
-                "name": step.name,
-                "value": step.value,
-                "objectives": dict(step.objectives),
-                "degrees": dict(step.degrees),
-                "status": step.status,
-                "about": dict(step.about),
-                "message": step.message,
-            }
-            for step in choice.history
-        ],
+        "steps": [asdict(step) for step in choice.history],
         "message": choice.message,
     }
-
-
-def _message(found: list[tuple[str, Choice]]) -> str:
-    return "; ".join(f"{label}: {choice.message}" for label, choice in found if choice.message)
 
 
 def _plain(label: Any, one: Any) -> dict[str, Any]:
@@ -190,10 +176,6 @@ def _ranges(given: Any) -> Ranges:
     if not isinstance(given, Mapping) or set(given) != {"best", "worst"}:
         raise ValueError(f"Decide: ranges must be a table with best and worst, not {given!r}")
     return Ranges(**given)
-
-
-def _data(ranges: Ranges) -> dict[str, dict[str, float]]:
-    return {"best": dict(ranges.best), "worst": dict(ranges.worst)}
 
 
 def _shown(value: Any) -> str:

@@ -11,12 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 HANDLINGS = ("feasible-first", "penalty", "objective")
-
-
 BEYOND_ALL = 1e30
 """Larger than any objective; its square is still finite."""
-
-
 Presented = tuple[np.ndarray, np.ndarray]
 """Finite objectives (n, m), and violations (n,): 0 for a point that counts as feasible, infinite if the evaluation failed."""
 
@@ -83,27 +79,15 @@ def _finite(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(cv)[:, None], F, BEYOND_ALL)
 
 
-def total(v: np.ndarray) -> np.ndarray:
-    """Sums (k,) of violations v (k, c): eq. (18) with eq. (16) without its upper bound."""
-    return v.sum(axis=1)
-
-
-def logarithmic(v: np.ndarray) -> np.ndarray:
-    """Sums (k,) of log(1 + v) for violations v (k, c): eq. (18) with logarithms."""
-    return np.log1p(v).sum(axis=1)
-
-
-def printed(v: np.ndarray) -> np.ndarray:
-    """Sums (k,) of violations v (k, c), each at most 1, which is twice the limit: eqs. (16)-(18) as printed."""
-    return np.minimum(v, 1.0).sum(axis=1)
-
-
-SUMS: dict[str, Callable[[np.ndarray], np.ndarray]] = {"sum": total, "log": logarithmic, "printed": printed}
-"""Degrees of violation by name, after Chai and others (2020)."""
+SUMS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "sum": lambda v: v.sum(axis=1),  # eq. (18) with eq. (16) without its upper bound
+    "log": lambda v: np.log1p(v).sum(axis=1),
+    "printed": lambda v: np.minimum(v, 1.0).sum(axis=1),  # each at most 1, twice the limit: eqs. (16)-(18) as printed
+}
+"""Degrees (k,) of violations v (k, c) by name, after Chai and others (2020)."""
 
 
 DEGREES = ("largest", *SUMS)
-"""Names of the degrees of violation."""
 
 
 def degree(name: str, violation: np.ndarray, violations: Callable[[], np.ndarray], tolerance: float) -> np.ndarray:

@@ -15,8 +15,6 @@ from .constraints import excess
 from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
 from .pymoo_adapter import Baseline, rows_of
 
-WAITING = -1
-"""In place of a number of evaluations, as long as the swarm is not complete."""
 SETTLING = 20
 """Iterations over which the mean of the front is compared, for `settled`."""
 
@@ -135,7 +133,7 @@ class MOPSO(PopulationSolver):
             best=swarm,
             leaders=swarm.take(np.arange(0)),
             velocity=np.zeros((len(swarm), len(evaluator.free))),
-            launched=WAITING,
+            launched=-1,
             means=np.empty((0, swarm.F.shape[1])),
         )
         self._update(state, swarm, evaluator, budget)
@@ -146,7 +144,7 @@ class MOPSO(PopulationSolver):
         left = budget - evaluator.counts.evaluations
         if left <= 0:
             return
-        if state.launched == WAITING:
+        if state.launched < 0:
             seen = self._draw_more(state, evaluator, min(left, int(self.search * budget) - evaluator.counts.evaluations))
         else:
             seen = self._move(state, evaluator, left, budget)
@@ -200,9 +198,9 @@ class MOPSO(PopulationSolver):
         state.note(tolerance)
         spent = evaluator.counts.evaluations
         complete = self.handling != "feasible-first" or state.all_feasible or spent >= int(self.search * budget)
-        if state.launched == WAITING and complete:
+        if state.launched < 0 and complete:
             state.launched = spent
-        if state.launched != WAITING and len(state.archive):
+        if state.launched >= 0 and len(state.archive):
             state.means = np.vstack([state.means, state.archive.F.mean(axis=0)])[-SETTLING - 1 :]
 
     def has_settled(self, state: ParticleState) -> bool:

@@ -40,14 +40,9 @@ class Step:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
-    >>> from macs.decisions import ReferencePoint, decide
-    >>> choice = decide(load("goddard"), ReferencePoint({"flight time": 180.0}), start=front, starts=1)
-    >>> len(choice.history) > 0
-    True
+    >>> from macs.decisions import Step
+    >>> Step("achievement", 0.2, {"flight time": 180.0}, {"flight time": 0.8}, "converged").message
+    ''
     """
 
     name: str
@@ -191,17 +186,9 @@ class Turn:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
-    >>> from macs.decisions import Dialogue, ReferencePoint
-    >>> dialogue = Dialogue(front)  # without the problem, points are ranked
-    >>> choice = dialogue.prefer(ReferencePoint({"flight time": 180.0}))
-    >>> choice = dialogue.choose()
-    >>> turn = dialogue.history[-1]
-    >>> turn.choice is None
-    False
+    >>> from macs.decisions import Turn, WeightedSum
+    >>> Turn("quicker", WeightedSum({"flight time": 1.0})).choice is None  # nothing chosen yet
+    True
     """
 
     asked: str

@@ -52,8 +52,6 @@ NO_OPTIMUM = "it is feasible, but where a solve ended before its optimum"
 """Note of a point at which a solve failed."""
 NOTHING_BETTER = "no better point was found than the best that was known"
 """Message where a known point is the choice."""
-BEST_RANKED = 3
-"""Points of `start` that solves begin at by default, the best-ranked."""
 Result = TypeVar("Result")
 
 
@@ -211,7 +209,8 @@ class DecisionSolver:
         if not feasible.any():
             return []
         order = [int(i) for i in self._preference.rank(self.known, self.ranges).order if feasible[int(i)]]
-        most = len(order) if self._start is None else BEST_RANKED if self._terms.starts == AUTO else int(self._terms.starts)
+        # By default solves begin at the three best of a start.
+        most = len(order) if self._start is None else 3 if self._terms.starts == AUTO else int(self._terms.starts)
         chosen, verify = self.known[order[:most]], self._terms.verify
         # Compared with what is found and simulated.
         return list(chosen if chosen.was_simulated.all() or verify is None else verified(chosen, verify, objective_scales(self.known)))

@@ -36,14 +36,9 @@ class WeightedSum(Preference):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import WeightedSum
-    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 3})
-    >>> print(wish.rank(front).order)  # best first
-    [2 1 0]
+    >>> WeightedSum({"flight time": 1, "horizontal speed": 3}).words
+    'weighted sum of flight time, horizontal speed'
     """
 
     weights: Mapping[str, float]
@@ -91,14 +86,9 @@ class ReferencePoint(Preference):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import ReferencePoint
-    >>> wish = ReferencePoint({"flight time": 150.0})
-    >>> print(wish.rank(front).order)  # best first
-    [1 2 0]
+    >>> ReferencePoint({"flight time": 150.0}, reservation={"flight time": 180.0}).words
+    'reference point of flight time'
     """
 
     aspiration: Mapping[str, float]
@@ -184,14 +174,10 @@ class Nimbus(Preference):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import Nimbus
-    >>> wish = Nimbus(front[1], improve=["horizontal speed"], until={"flight time": 200.0})
-    >>> print(wish.rank(front).order)  # best first
-    [1 2 0]
+    >>> now = {"flight time": 180.0, "horizontal speed": 0.6}  # or a point of a front
+    >>> Nimbus(now, improve=["horizontal speed"], until={"flight time": 200.0}).words
+    'nimbus of horizontal speed, flight time'
     """
 
     current: Mapping[str, float]

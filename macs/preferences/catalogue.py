@@ -25,8 +25,6 @@ METHODS: dict[str, type[Preference]] = {
 }
 CLASSES: dict[str, type[ObjectiveClass]] = {one.__name__: one for one in (Smaller, Larger, Value, Range)}
 AROUND = Around.__name__
-DEEPEST = 4
-"""How deep settings are nested at most."""
 
 
 def to_dict(preference: Preference) -> dict[str, Any]:
@@ -107,7 +105,7 @@ def _plain(value: Any) -> Any:
 
 def _made(value: Any, depth: int) -> Any:
     """A value from plain data. Objects name their class by a text; an objective of the name "class" has no text as its value."""
-    if depth > DEEPEST:
+    if depth > 4:  # a pair of tolerances of a target is as deep
         raise ValueError("its settings are nested too deeply")
     if isinstance(value, bool):
         raise ValueError(f"{value} is no number")

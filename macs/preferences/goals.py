@@ -31,14 +31,9 @@ class Around:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import Around, FuzzyGoal
-    >>> wish = FuzzyGoal({"flight time": Around(180.0, tolerance=50.0)})
-    >>> print(wish.rank(front).order)  # best first
-    [1 2 0]
+    >>> FuzzyGoal({"flight time": Around(180.0, tolerance=50.0)}).targets["flight time"].sides
+    (50.0, 50.0)
     """
 
     value: float
@@ -180,14 +175,9 @@ class GoalProgramming(Preference):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import GoalProgramming
-    >>> wish = GoalProgramming({"flight time": 150.0, "horizontal speed": 0.7})
-    >>> print(wish.rank(front).order)  # best first
-    [1 2 0]
+    >>> GoalProgramming({"flight time": 150.0, "horizontal speed": 0.7}, weights={"flight time": 2.0}).words
+    'goal programming of flight time, horizontal speed'
     """
 
     targets: Mapping[str, Target]
@@ -271,14 +261,9 @@ class FuzzyGoal(Preference):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import FuzzyGoal
-    >>> wish = FuzzyGoal({"flight time": 150.0, "horizontal speed": 0.7})
-    >>> print(wish.rank(front).order)  # best first
-    [1 0 2]
+    >>> FuzzyGoal({"flight time": 150.0, "horizontal speed": 0.7}, tolerances={"flight time": 30.0}).words
+    'fuzzy goal of flight time, horizontal speed'
     """
 
     targets: Mapping[str, Target]
@@ -357,14 +342,9 @@ class FuzzySatisfactory(Preference):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import FuzzySatisfactory
-    >>> wish = FuzzySatisfactory({}, priorities=["horizontal speed", "flight time"])
-    >>> print(wish.rank(front).order)  # best first
-    [1 2 0]
+    >>> FuzzySatisfactory({"flight time": 150.0}, priorities=["horizontal speed", "flight time"]).words
+    'fuzzy satisfactory of horizontal speed, flight time'
     """
 
     targets: Mapping[str, Target]

@@ -17,9 +17,6 @@ from .preference_functions import RANGE_NAMES, FuzzyFunction, ObjectiveClass, Pr
 from .ranges import Ranges, named, places
 from .stage import Operand, Stage, log10
 
-CRISP = "preference function"
-"""Word of legends."""
-
 
 @dataclass(frozen=True, repr=False)
 class PhysicalProgramming(Preference):
@@ -41,14 +38,10 @@ class PhysicalProgramming(Preference):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import PhysicalProgramming, Smaller
     >>> wish = PhysicalProgramming({"flight time": Smaller(120, 140, 170, 210, 260)})
-    >>> print(wish.rank(front).order)  # best first
-    [0 1 2]
+    >>> round(float(wish.functions["flight time"](120)), 3)
+    0.1
     """
 
     classes: Mapping[str, ObjectiveClass]
@@ -56,7 +49,6 @@ class PhysicalProgramming(Preference):
 
     DEGREE: ClassVar[str] = "degree"
     SMALLER: ClassVar[bool] = True
-    FUZZY: ClassVar[str] = "fuzzy preference function"
     MARKS: ClassVar[tuple[tuple[float, str], ...]] = tuple((k + 0.5, name) for k, name in enumerate(RANGE_NAMES))
 
     def __post_init__(self) -> None:
@@ -127,14 +119,11 @@ class PhysicalProgramming(Preference):
             crisp = self.functions[name]
             marks = [boundary for boundary, _ in crisp.boundaries]
             margin = 0.08 * (marks[-1] - marks[0])
-            fuzzy = () if minimised[name] is crisp else ((self.FUZZY, minimised[name]),)
+            fuzzy = () if minimised[name] is crisp else (("fuzzy preference function", minimised[name]),)
             low, high, goal = marks[0] - margin, marks[-1] + margin, goals[found[name]]
             directed = one.SENSE is not None
-            curves.append(Curve(goal, found[name], (*fuzzy, (CRISP, crisp)), low, high, tuple(marks), one.degree, directed))
+            curves.append(Curve(goal, found[name], (*fuzzy, ("preference function", crisp)), low, high, tuple(marks), one.degree, directed))
         return curves
-
-
-SPREAD = 0.1
 
 
 @dataclass(frozen=True, repr=False)
@@ -159,18 +148,13 @@ class FuzzyPhysicalProgramming(PhysicalProgramming):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import FuzzyPhysicalProgramming, Smaller
-    >>> wish = FuzzyPhysicalProgramming({"flight time": Smaller(120, 140, 170, 210, 260)}, spread={"flight time": 5.0})
-    >>> print(wish.rank(front).order)  # best first
-    [0 1 2]
+    >>> FuzzyPhysicalProgramming({"flight time": Smaller(120, 140, 170, 210, 260)}, spread={"flight time": 5.0}).spreads
+    {'flight time': 5.0}
     """
 
     _: KW_ONLY
-    spread: float | Mapping[str, float] = SPREAD
+    spread: float | Mapping[str, float] = 0.1
     printed: bool = False
 
     def __post_init__(self) -> None:

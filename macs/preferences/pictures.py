@@ -88,9 +88,6 @@ def draw_degrees(
     return ax
 
 
-SAMPLES = 801
-
-
 @dataclass(frozen=True)
 class Curve:
     """A function of one objective."""
@@ -131,7 +128,7 @@ def draw_functions(
 
 
 def _draw(curve: Curve, ax: Any, points: np.ndarray, best: int | None, logarithmic: bool) -> None:
-    x = np.union1d(np.linspace(curve.low, curve.high, SAMPLES), [b for b in curve.boundaries if curve.low <= b <= curve.high])
+    x = np.union1d(np.linspace(curve.low, curve.high, 801), [b for b in curve.boundaries if curve.low <= b <= curve.high])
     if curve.degree is not None:
         shade_ranges(ax, curve.boundaries, curve.degree, (curve.low, curve.high))
     for k, (name, function) in enumerate(curve.functions):

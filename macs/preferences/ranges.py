@@ -94,13 +94,7 @@ class Ranges:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import Ranges
-    >>> round(Ranges.of(front).worst["flight time"], 3)
-    250.0
     >>> Ranges({"cost": 1.0}, {"cost": 5.0}).worst
     {'cost': 5.0}
     """

@@ -78,14 +78,10 @@ class Stage:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
-    >>> from macs.decisions import Ranges, WeightedSum
-    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 1})
-    >>> len(wish.stages(front.goals, Ranges.of(front)))
-    1
+    >>> import numpy as np
+    >>> from macs.decisions import Stage
+    >>> Stage("sum", lambda J, peaks: J[0] + J[1], limits=lambda J: [J[0] - 2]).numbers(np.array([[1.0, 5.0], [3.0, 1.0]]))
+    array([ 6., inf])
     """
 
     name: str
