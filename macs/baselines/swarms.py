@@ -171,7 +171,8 @@ class MOPSO(PopulationSolver):
 
         X, best, leaders = (box.to_unit(some.Z[:, free]) for some in (state.members, state.best, state.leaders.take(followed)))
         sign = -1.0 if self.printed else 1.0
-        weights = inertia(share, self.inertia, self.final_inertia), sign * self.cognitive, sign * self.social
+        inertia = self.inertia + (self.final_inertia - self.inertia) * min(max(share, 0.0), 1.0)
+        weights = inertia, sign * self.cognitive, sign * self.social
         V = velocities(box, X, state.velocity, best, leaders, weights=weights, chance=chance, largest=self.max_velocity)
         X, V = moved(box, X, V, rebound)
 
@@ -357,11 +358,6 @@ def thin_out(cube: np.ndarray, limit: int, rng: np.random.Generator) -> np.ndarr
         keep[rng.choice(np.flatnonzero(keep & (cube == fullest)))] = False
         occupancy[fullest] -= 1
     return keep
-
-
-def inertia(share: float, first: float, last: float) -> float:
-    """Weight w of the old velocity after this share of the search, linear from `first` to `last`."""
-    return first + (last - first) * min(max(share, 0.0), 1.0)
 
 
 def velocities(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from synthetic_fronts import black_box, empty, flights
 
 from macs import Front, sweep
 from macs.decisions import (
-    Choice,
     Dialogue,
     FuzzyPhysicalProgramming,
     Larger,
@@ -323,17 +321,6 @@ def test_the_history_is_drawn() -> None:
 
 
 @pytest.mark.slow
-def test_a_front_that_was_not_simulated_is_saved_with_points_that_were(tmp_path: Path) -> None:
-    bare = sweep(cart(), MESH, points=5, verify=None, starts=1)
-    dialogue, path = Dialogue(bare, cart(), MESH), tmp_path / "choice.json"
-    dialogue.prefer(HOPED)
-    assert dialogue.choose().point.verified and not bare.was_simulated.any()
-    dialogue.save(path)
-    again = Dialogue.load(path)
-    assert again.choose().point.verified and not again.front.was_simulated.any() and len(again.known) == 6
-
-
-@pytest.mark.slow
 def test_more_objectives() -> None:
     front = sweep(corners(), MESH, points=15, starts=1)
     dialogue = Dialogue(front, corners(), MESH)
@@ -346,17 +333,6 @@ def test_more_objectives() -> None:
     assert len(dialogue.plot(figure=Figure(layout="constrained"))) == 4
 
 
-def test_points_that_are_known_are_kept_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    dialogue = begun()
-
-    def third(problem: Any, method: Any, preference: Any, *, ranges: Any, start: Any, **_: Any) -> Choice:
-        return Choice.of(start[[2]][0], preference, ranges)
-
-    monkeypatch.setattr("macs.decisions.dialogue.decide", third)
-    assert dialogue.choose().point.objectives == front()[2].objectives
-    assert dialogue.found == [] and len(dialogue.known) == 9
-
-
 def test_an_improvement_that_is_interrupted_leaves_no_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
@@ -367,18 +343,3 @@ def test_an_improvement_that_is_interrupted_leaves_no_turn(monkeypatch: pytest.M
     with pytest.raises(KeyboardInterrupt):
         dialogue.improve("time")
     assert len(dialogue.history) == 1 and dialogue.choose() is now
-
-
-def test_alternatives_that_are_interrupted_leave_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    dialogue = begun()
-    dialogue.choose()
-    made = []
-
-    def stopped(problem: Any, method: Any, preference: Any, *, ranges: Any, start: Any, **_: Any) -> Choice:
-        made.append(preference)
-        return replace(Choice.of(start[0], preference, ranges), stopped="interrupted")
-
-    monkeypatch.setattr("macs.decisions.dialogue.decide", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        dialogue.alternatives(4)
-    assert len(made) == 1 and dialogue.alternatives_found == ()

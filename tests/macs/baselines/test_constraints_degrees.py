@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs import MOPSO, NSGA2, NSGA3
+from macs import MOPSO, NSGA2
 from macs.baselines.constraints import DEGREES, degree, excess, presented, problem_type
 from macs.evaluation.bilevel import Bilevel
 from problems import Problem, load
@@ -100,14 +100,6 @@ def test_those_of_a_trajectory_are_what_its_point_tells(inner) -> None:
         assert dict(zip(nlp.constraints, row.tolist(), strict=True)) == nlp.violations(z)
 
 
-def test_they_are_not_computed_unless_needed(monkeypatch) -> None:
-    nlp = DFET(2, 3).transcribe(load("goddard"))
-    monkeypatch.setattr(type(nlp), "by_constraint", lambda *_: pytest.fail("asked for"))
-    evaluator = Bilevel(nlp, inner_solver("propagate"), 1e-6)
-    state = NSGA2(population=4).begin(evaluator, 4, np.random.default_rng(0))
-    assert len(state.members) == 4
-
-
 def test_a_peak_without_bounds_is_no_violation() -> None:
     problem = Problem("peak")
     phase = problem.phase("slide", t0=0, tf=1)
@@ -130,7 +122,7 @@ def two_limits(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", DEGREES[:3])  # the printed one does not distinguish better from worse where both are missed by their size
-@pytest.mark.parametrize("solver", [NSGA2, NSGA3, MOPSO], ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("solver", [NSGA2, MOPSO], ids=lambda kind: kind.__name__)
 def test_solvers_rank_by_the_degree_and_show_the_violation(solver, name) -> None:
     size = {"particles": 20} if solver is MOPSO else {"population": 20}
     front = solver(**size, degree=name).minimize(two_limits, [(-2, 2)] * 2, evaluations=1000, seed=3)

@@ -106,18 +106,6 @@ def test_progress_is_that_of_pymoo_by_generations_or_by_evaluations() -> None:
             assert np.array_equal(ours.nadir, truth.algorithm.survival.nadir)
 
 
-def test_a_larger_budget_is_another_search_and_a_partial_generation_counts_as_one() -> None:
-    def after_nine(budget: int) -> np.ndarray:
-        settings, box = RVEA(divisions=11), boxed(spheres, CUBE)
-        state = settings.begin(box, budget, np.random.default_rng(1))
-        for _ in range(8):
-            settings.advance(state, box, budget)
-        return state.members.F
-
-    assert np.array_equal(after_nine(12 * 19 + 1), after_nine(12 * 20))
-    assert not np.array_equal(after_nine(12 * 10), after_nine(12 * 20))
-
-
 def test_vectors_are_not_adapted_to_an_objective_that_is_always_the_same() -> None:
     def function(X: np.ndarray) -> np.ndarray:
         return np.hstack([spheres(X), np.ones((len(X), 1))])
@@ -125,13 +113,6 @@ def test_vectors_are_not_adapted_to_an_objective_that_is_always_the_same() -> No
     state = last(RVEA(divisions=6), function, 28 * 20)
     assert np.isfinite(state.vectors).all()
     assert len(state.archive) >= 5
-
-
-def test_it_still_spreads_where_few_first_points_are_feasible() -> None:
-    def function(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return spheres(X), np.abs(((X - 0.5) ** 2).sum(axis=1, keepdims=True) - 1) - 0.1
-
-    assert len(RVEA(divisions=11).minimize(function, CUBE, evaluations=480, seed=1)) >= 6
 
 
 # C-TAEA
