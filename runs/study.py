@@ -16,10 +16,9 @@ from problems.compiled import Objective
 from transcription import Smooth
 
 from .batch import file as studyfile
-from .batch.cells import Cell, combine
-from .batch.store import Store, StoredRun, Summary
-from .batch.terms import INNER, check_inner, sampling, written
-from .execution.task import Payload, Task
+from .batch.cells import INNER, Cell, check_inner, combine, sampling, written
+from .batch.store import Store, StoredRun, StudySummary
+from .execution.task import Payload, RunTask
 from .files import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
 from .measures.references import ReferenceKey, check_reference
 from .report.goal import StatedGoal
@@ -211,7 +210,7 @@ class Study:
         retry: bool = False,
         solvers: Sequence[str] | None = None,
         progress: bool = False,
-    ) -> Summary:
+    ) -> StudySummary:
         """Make the runs that `out` does not have yet. Each that has begun goes on from a checkpoint of its own.
 
         Parameters
@@ -232,7 +231,7 @@ class Study:
 
         Returns
         -------
-        Summary
+        StudySummary
             How many runs of each cell there are by now, and why others failed. That some failed is no error.
 
         Raises
@@ -262,7 +261,7 @@ class Study:
                 raise ValueError(f"study '{self.name}': {unknown('solver', one, known)}")
         return [one for one in known if solvers is None or one in solvers]
 
-    def status(self, out: str | PathLike[str]) -> Summary:
+    def status(self, out: str | PathLike[str]) -> StudySummary:
         """The state of the runs in `out`, with the reasons of failures. Raises ValueError if it contains another study, or none."""
         store = Store.open(out)
         store.check(self.definition())
@@ -317,9 +316,9 @@ class Study:
             "cells": [cell.to_dict() for cell in self.cells],
         }
 
-    def _task(self, run: StoredRun, checkpoint: Path) -> Task:
+    def _task(self, run: StoredRun, checkpoint: Path) -> RunTask:
         """The task that makes a run."""
-        return Task(
+        return RunTask(
             payload=self.payloads[run.cell.labels],
             evaluations=run.cell.evaluations,
             seed=run.seed,

@@ -1,4 +1,4 @@
-"""Cells of a study: every problem with each of its transcriptions and every solver, by labels."""
+"""Cells of a study: every problem with each of its transcriptions and every solver, by labels, and the terms of their runs."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import hashlib
 import json
 import pickle
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,20 +17,160 @@ from macs.io.text import call
 from macs.refinement.search_mesh import default_transcription
 from macs.search.rounds import PLANNED
 from macs.solvers.solver import Solver, solver
+from macs.solvers.start import drawing
 from problems import Problem, VectorProblem, load
 from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription import Smooth, Transcription, stated, word
+from transcription.inner import NAMED
 
 from ..execution.task import Addressed, Payload
-from ..files import errors_begin_with, plain
-from .terms import check_terms, sampling, terms_of_problem
+from ..files import Section, check_known, checked, errors_begin_with, plain
 
-STATEMENTS = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
+Statement = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
 AUTO = "auto"
 """In place of a budget: a search of MACS ends when it is done."""
-Statement = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
+WITHOUT = "no transcription"
+"""Label of the transcription of a vector problem, which has none."""
+OWN = "the problem's own mesh"
+"""Label of a default transcription that cannot be written in a word."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The data that all runs of a cell share."""
+
+    problem: str  # problem, transcription, solver: Labels, as the study names them; together they are the cell's name
+    transcription: str
+    solver: str
+    evaluations: int | None  # budget of each run; None: until the search is done
+    # Plain data that decide the runs' numbers: fingerprint and settings. Another study in the same folder differs in them.
+    details: Mapping[str, Any] = field(hash=False, repr=False)
+
+    @property
+    def planned(self) -> int:
+        """Its budget, or where there is none about what a search takes."""
+        return PLANNED if self.evaluations is None else self.evaluations
+
+    @property
+    def labels(self) -> tuple[str, str, str]:
+        """Problem, transcription, solver."""
+        return self.problem, self.transcription, self.solver
+
+    @property
+    def terms(self) -> Mapping[str, Any]:
+        """The terms of its runs that differ from the study's: those of its solver, and of its problem where the study states none."""
+        return self.details.get("terms", {})
+
+    @property
+    def apart(self) -> bool:
+        """Whether its solver works on a transcription of its own, unlike the other solvers of the study."""
+        return "transcription" in self.terms
+
+    @property
+    def name(self) -> str:
+        """The labels in one line: goddard, dfet:4x6, macs."""
+        return ", ".join(self.labels)
+
+    @property
+    def folder(self) -> str:
+        """The name of its folder: of letters that any file system takes, and no other cell's."""
+        plain = "__".join(re.sub(r"[^A-Za-z0-9.-]+", "-", label).strip(".") or "-" for label in self.labels)
+        if len(plain) <= 80 and plain.lower() == "__".join(self.labels).replace(":", "-"):
+            return plain
+        return f"{plain[:80]}__{self._digest()[:4].hex()}"
+
+    def seed(self, study: int, run: int) -> int:
+        """The seed of run 1, 2, ...: 63 bits.
+
+        Spawned from the study's seed by a key made of the cell's labels and of the run's number. So neither more runs nor other cells
+        change it, and two cells never share one.
+        """
+        words = np.frombuffer(self._digest()[:16], dtype="<u4").tolist()
+        return int(np.random.SeedSequence(study, spawn_key=(*words, run)).generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain data, for the study's record."""
+        return {**vars(self), "folder": self.folder, "details": dict(self.details)}
+
+    def _digest(self) -> bytes:
+        return hashlib.sha256(json.dumps(self.labels).encode()).digest()
+
+
+# Terms of runs
+
+INNER = "auto"
+"""The inner level where none is stated."""
+
+
+class SolverTerms(Section):
+    """The terms of one solver of a study, where they differ from those of the others."""
+
+    transcription: Any = None
+    evaluations: Any = None
+    inner: Any = None
+    start: Any = None
+
+
+def check_terms(terms: Any, solvers: Collection[str]) -> None:
+    """Raise ValueError that names what is wrong in a study's `terms`, of solvers with these labels."""
+    if not isinstance(terms, Mapping):
+        raise ValueError(f"terms must be a table of tables, one for a solver, not {terms!r}")
+    for label, own in terms.items():
+        if label not in solvers:
+            raise ValueError(f"terms: there is no solver '{label}'; there are {', '.join(solvers)}")
+        with errors_begin_with(f"terms of '{label}'"):
+            checked(own, SolverTerms)
+            if not own:
+                raise ValueError(f"it must be a table with {', '.join(SolverTerms.__struct_fields__)}, not {own!r}")
+            given = own.get("transcription")
+            if any(isinstance(one, list | tuple | Mapping) for one in (given.values() if isinstance(given, Mapping) else [given])):
+                raise ValueError(f"transcription must be one, or one for each problem, not {given!r}")
+            if "inner" in own:
+                check_inner(own["inner"])
+            sampling(own.get("start"))
+
+
+def terms_of_problem(problem: Statement, inner: str | None, start: Any) -> dict[str, Any]:
+    """The inner level and start that a problem states, where the study states none: plain data. A compiled or vector problem has none.
+
+    Raises ValueError if they are wrong.
+    """
+    found: dict[str, Any] = {}
+    if not isinstance(problem, Problem):
+        return found
+    if inner is None:
+        check_inner(problem.default_inner)
+        found |= {"inner": problem.default_inner} if problem.default_inner != INNER else {}
+    if start is None and problem.default_start is not None:
+        found["start"] = written(problem.default_start)
+    return found
+
+
+def check_inner(inner: Any) -> None:
+    """Raise ValueError unless there is an inner level of this name."""
+    check_known("inner level", [inner], NAMED)
+
+
+def sampling(start: Any) -> Smooth | str | None:
+    """The argument `start` of `solve`. Raises ValueError if there is no such start."""
+    if isinstance(start, Mapping):
+        check_known("setting of start", start, Smooth.__dataclass_fields__)
+        return Smooth(**start)
+    found = drawing(start)
+    if found is None and start is not None:
+        raise ValueError(f"start must be 'uniform', 'smooth', or a table of the settings of Smooth, not {start!r}")
+    return found
+
+
+def written(start: Any) -> Any:
+    """A start as plain data, which `sampling` reads."""
+    found = sampling(start)
+    return asdict(found) if isinstance(found, Smooth) else found
+
+
+# Cells
 
 
 def combine(
@@ -151,13 +291,13 @@ def _label(one: Any) -> str:
         return word(one) or call(about["method"], about["settings"])
     if is_pymoo(one):
         return type(one).__name__
-    return type(one).__name__.lower() if isinstance(one, Solver) else one.name if isinstance(one, STATEMENTS) else str(one)
+    return type(one).__name__.lower() if isinstance(one, Solver) else one.name if isinstance(one, Statement) else str(one)
 
 
 def _problem(label: str, given: Any) -> Statement:
     data = dict(given) if isinstance(given, Mapping) else {"problem": given}
     name = data.pop("problem", None)
-    if isinstance(name, STATEMENTS) and not data:
+    if isinstance(name, Statement) and not data:
         return name
     if is_pymoo(name) and not data:
         with errors_begin_with(f"problems: '{label}'"):
@@ -260,72 +400,3 @@ def _pickled(place: str, *parts: Any) -> bytes:
         return pickle.dumps(parts if len(parts) > 1 else parts[0])
     except Exception as error:
         raise ValueError(f"{place}: it cannot be sent to another process ({error})") from error
-
-
-WITHOUT = "no transcription"
-"""Label of the transcription of a vector problem, which has none."""
-OWN = "the problem's own mesh"
-"""Label of a default transcription that cannot be written in a word."""
-LONGEST = 80
-"""Characters of a folder's name."""
-
-
-@dataclass(frozen=True)
-class Cell:
-    """The data that all runs of a cell share."""
-
-    problem: str  # problem, transcription, solver: Labels, as the study names them; together they are the cell's name
-    transcription: str
-    solver: str
-    evaluations: int | None  # budget of each run; None: until the search is done
-    # Plain data that decide the runs' numbers: fingerprint and settings. Another study in the same folder differs in them.
-    details: Mapping[str, Any] = field(hash=False, repr=False)
-
-    @property
-    def planned(self) -> int:
-        """Its budget, or where there is none about what a search takes."""
-        return PLANNED if self.evaluations is None else self.evaluations
-
-    @property
-    def labels(self) -> tuple[str, str, str]:
-        """Problem, transcription, solver."""
-        return self.problem, self.transcription, self.solver
-
-    @property
-    def terms(self) -> Mapping[str, Any]:
-        """The terms of its runs that differ from the study's: those of its solver, and of its problem where the study states none."""
-        return self.details.get("terms", {})
-
-    @property
-    def apart(self) -> bool:
-        """Whether its solver works on a transcription of its own, unlike the other solvers of the study."""
-        return "transcription" in self.terms
-
-    @property
-    def name(self) -> str:
-        """The labels in one line: goddard, dfet:4x6, macs."""
-        return ", ".join(self.labels)
-
-    @property
-    def folder(self) -> str:
-        """The name of its folder: of letters that any file system takes, and no other cell's."""
-        plain = "__".join(re.sub(r"[^A-Za-z0-9.-]+", "-", label).strip(".") or "-" for label in self.labels)
-        if len(plain) <= LONGEST and plain.lower() == "__".join(self.labels).replace(":", "-"):
-            return plain
-        return f"{plain[:LONGEST]}__{self._digest()[:4].hex()}"
-
-    def seed(self, study: int, run: int) -> int:
-        """The seed of run 1, 2, ...: 63 bits.
-
-        Spawned from the study's seed by a key made of the cell's labels and of the run's number. So neither more runs nor other cells
-        change it, and two cells never share one.
-        """
-        words = np.frombuffer(self._digest()[:16], dtype="<u4").tolist()
-        return int(np.random.SeedSequence(study, spawn_key=(*words, run)).generate_state(1, np.uint64)[0] >> np.uint64(1))
-
-    def to_dict(self) -> dict[str, Any]:
-        """As plain data, for the study's record."""
-        return {**vars(self), "folder": self.folder, "details": dict(self.details)}
-
-    def _digest(self) -> bytes:
-        return hashlib.sha256(json.dumps(self.labels).encode()).digest()

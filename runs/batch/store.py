@@ -35,8 +35,7 @@ from macs.fronts.files import LARGEST_FRONT
 from macs.io.atomic import read_whole, write_whole
 from macs.io.text import duration, html_block, html_table, text_table
 
-from ..execution.samples import History
-from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, Outcome, SimulationRecord, samples_path
+from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, History, RunOutcome, SimulationRecord, samples_path
 from ..files import Count, Natural, Positive, checked, errors_begin_with, load_front, read_record, to_record
 from .cells import Cell
 
@@ -63,7 +62,7 @@ class Definition(msgspec.Struct):
 
 
 class RunRecord(msgspec.Struct):
-    """The record of a run, see `Outcome`; `front` is the checksum of its front's file. By default that of a run without a record."""
+    """The record of a run, see `RunOutcome`; `front` is the checksum of its front's file. By default that of a run without a record."""
 
     status: Literal["finished", "crashed", "timeout", "out of memory", "killed", "missing"] = "missing"
     message: str = ""
@@ -89,7 +88,7 @@ class StoredRun:
     # Of a finished run: "evaluations", "inner_iterations", "gradient_solves", "elapsed" and "F" (a list of objectives, all minimised) at
     # about thirty counts, the last being its front's. Empty if its file is gone.
     history: Mapping[str, Any] = field(repr=False)
-    simulated: Mapping[str, Any] = field(repr=False)  # of a finished run whose points were simulated: see `Outcome.simulated`
+    simulated: Mapping[str, Any] = field(repr=False)  # of a finished run whose points were simulated: see `RunOutcome.simulated`
     path: Path  # of its front, whether it exists or not
     trust: bool = False  # whether its problem may be loaded from an address that is not in the catalogue
 
@@ -110,7 +109,7 @@ LEFT = [True] * 3 + [False] * 4
 
 
 @dataclass(frozen=True)
-class Summary:
+class StudySummary:
     """The state of a study."""
 
     name: str
@@ -275,9 +274,9 @@ class Store:
             trust=self.trust,
         )
 
-    def summary(self, count: int | None = None) -> Summary:
+    def summary(self, count: int | None = None) -> StudySummary:
         """The state of the study, with the runs that were asked for or `count` of each cell."""
-        return Summary(self.definition["name"], self.path, tuple(self.runs(count)))
+        return StudySummary(self.definition["name"], self.path, tuple(self.runs(count)))
 
     def checkpoint_path(self, run: StoredRun) -> Path:
         """Where a run is kept while it lasts, in a folder that is made. The path is absolute, as its process may be in another folder."""
@@ -285,7 +284,7 @@ class Store:
         path.parent.mkdir(exist_ok=True)
         return path
 
-    def keep(self, run: StoredRun, outcome: Outcome) -> None:
+    def keep(self, run: StoredRun, outcome: RunOutcome) -> None:
         """Write the outcome of a run. Its front comes last and makes it finished; then its checkpoint is deleted. Raises OSError if a file
         cannot be written."""
         front, checkpoint = run.path, self.checkpoint_path(run)

@@ -28,8 +28,8 @@ from transcription import Smooth, parse
 from transcription.base import NLP
 from transcription.nlp.derivatives import gradients, hessian
 
-from ..execution.apart import lines_apart
-from ..execution.memory import peak_memory
+from ..execution.processes import lines_apart
+from ..execution.task import peak_memory
 from .contract import Bench, Effort, Row, Target, column, compiling, rounds_of, short
 
 Work = Callable[[], object]

@@ -20,8 +20,8 @@ from problems.problem import Problem
 from transcription import Meshed, MultipleShooting, Transcription, parse
 from transcription.base import CONVERGED
 
-from ..execution.apart import CRASHED, LATE, lines_apart
-from ..execution.memory import peak_memory
+from ..execution.processes import CRASHED, TIMEOUT, lines_apart
+from ..execution.task import peak_memory
 from .contract import Bench, Column, Effort, Row, Target, column
 
 SECONDS_EACH = 300.0
@@ -84,7 +84,7 @@ def by_defaults(name: str) -> None:
 def compared(case: str, record: PublishedOptimum, line: dict[str, Any]) -> Row:
     """The row of an optimum; its `who` is the verdict."""
     values = {key: float(value) for key, value in line.items() if key != "status"}
-    if line["status"] in (LATE, CRASHED):
+    if line["status"] in (TIMEOUT, CRASHED):
         return Row.once(case, line["status"], published=record.value, **values)
     values["error"] = record.error(values["simulated"])
     right = RIGHT if record.met(values["simulated"]) else WRONG
@@ -214,7 +214,7 @@ def method_targets(rows: Sequence[Row]) -> list[Target]:
 
 def counts(rows: Sequence[Row]) -> list[str]:
     """How many problems agree, and how many ended early."""
-    agreed, ended = sum(row.who.startswith(AGREED) for row in rows), sum(LATE in row.who or CRASHED in row.who for row in rows)
+    agreed, ended = sum(row.who.startswith(AGREED) for row in rows), sum(TIMEOUT in row.who or CRASHED in row.who for row in rows)
     return [f"agree: {agreed} of {len(rows)}; ended early: {ended}", ""]
 
 

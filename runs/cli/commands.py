@@ -26,10 +26,9 @@ from problems.checks import unknown
 from transcription.inner import NAMED
 
 from ..batch import file as studyfile
-from . import browser_commands, decide_command, study_commands
+from . import decide_command, study_commands
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, wrong_call_on_value_error
-from .fallback import saved
-from .inputs import check_is_front, check_picture, find_start, load_problem, problem_of, read_data, read_json, same_file
+from .inputs import check_is_front, check_picture, find_start, load_problem, problem_of, read_data, read_json, same_file, saved
 
 UNSIMULATED = "none"
 """Word for points that are not to be simulated."""
@@ -347,7 +346,7 @@ COMMANDS = {
     "verify": verify,
     "decide": decide_command.decide,
     "study": study_commands.study,
-    "report": browser_commands.report,
-    "serve": browser_commands.serve,
+    "report": study_commands.page_report,
+    "serve": study_commands.serve,
     "bench": bench,
 }

@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
 
-from ..execution.memory import is_memory_error, memory_message
 from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, deaf, ended_as_by_ctrl_c, ended_at_once
 
 EPILOG = """\
@@ -164,6 +163,8 @@ def _answer(argv: Sequence[str] | None) -> int:
     except OSError as error:
         return complain(error.strerror or str(error), arguments.parser.prog)
     except (MemoryError, RuntimeError) as error:
+        from ..execution.task import is_memory_error, memory_message
+
         if not is_memory_error(error):
             raise
         complain(memory_message(error), arguments.parser.prog)

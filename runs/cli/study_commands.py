@@ -1,11 +1,11 @@
-"""`macs study`: batches from the command line."""
+"""`macs study`: batches from the command line; `macs report` and `macs serve`: pages for the browser."""
 
 from __future__ import annotations
 
 import shlex
 import sys
 from argparse import Namespace
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,7 +24,7 @@ def study(arguments: Namespace) -> int:
 def run(arguments: Namespace) -> int:
     """Make the runs that are missing."""
     from ..batch.running import WorkersLost
-    from ..execution.workers import cluster
+    from ..execution.processes import cluster
     from ..study import Study
 
     if arguments.dask and arguments.jobs:
@@ -98,3 +98,58 @@ def page_of(arguments: Namespace) -> Page:
     trusted = " --trust" if arguments.trust else ""
     command = f"macs study report {shlex.quote(arguments.folder)} --page {shlex.quote(arguments.page)}{stated}{trusted}"
     return Page(arguments.page, command, find(source), Study.load(source, trust=arguments.trust).definition())
+
+
+# Pages for the browser
+
+
+def page_report(arguments: Namespace) -> int:
+    """A front or a study as one file for the browser."""
+    from ..browser.pages import write_page
+
+    source = find_source(arguments.source)
+    out = Path(arguments.html) if arguments.html else _beside(source)
+    if not arguments.html:
+        out.parent.mkdir(exist_ok=True)
+    elif out.suffix.lower() not in (".html", ".htm"):
+        raise WrongCall(f"--html {out}: the name of a page ends with .html")
+    try:
+        with wrong_call_on_value_error():
+            write_page(source, out, trust=arguments.trust, progress=True)
+    except OSError as error:
+        raise WrongCall(str(error)) from error
+    print(f"page in {out}")
+    return DONE
+
+
+def serve(arguments: Namespace) -> int:
+    """The same page, live, from a server that only reads; until Ctrl-C."""
+    from ..browser.live import followed
+    from ..browser.server import Server
+
+    path = find_source(arguments.source)
+    with wrong_call_on_value_error():
+        server = Server(followed(path, arguments.trust), arguments.host, arguments.port)
+    with suppress(KeyboardInterrupt), server:
+        if not server.local:
+            print("warning: everybody on the network can read this; without --host only this machine can", file=sys.stderr)
+        print(f"{path} is shown at {server.url} until Ctrl-C", flush=True)
+        server.serve_forever()
+    return DONE
+
+
+def find_source(word: str) -> Path:
+    """A front's file or a study's folder; for the name of a study the folder that it ran into by default."""
+    ran = Path("out") / word
+    return ran if not Path(word).exists() and (ran / "study.json").is_file() else Path(word)
+
+
+def _beside(source: Path) -> Path:
+    """Where the page of a front or study is written by default. Raises `WrongCall` if there is no such front or study."""
+    if source.is_dir():
+        if not (source / "study.json").is_file():
+            raise WrongCall(f"'{source}' contains no study: there is no study.json in it")
+        return source / "report" / "report.html"
+    if not source.is_file():
+        raise WrongCall(f"there is no file or folder '{source}'")
+    return source.with_suffix(".html")

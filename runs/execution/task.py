@@ -1,13 +1,15 @@
-"""One run in any process: from a task to its outcome, both plain data."""
+"""One run in any process: from a task to its outcome, both plain data; samples of its archive on the way, and its memory."""
 
 from __future__ import annotations
 
 import logging
+import math
 import os
 import pickle
+import sys
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -16,11 +18,12 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import numpy as np
 
 from macs.fronts.verified import accuracy
+from macs.io.atomic import write_whole
+from macs.search.rounds import PLANNED
 from macs.solvers.checkpoint import Unreadable, keeps
 from problems import load
 
-from .memory import is_memory_error
-from .samples import Report, Samples
+from ..files import checked, read_record, to_record
 
 if TYPE_CHECKING:
     from macs.front import Front
@@ -51,7 +54,7 @@ class Addressed:
 
 
 @dataclass(frozen=True)
-class Task:
+class RunTask:
     """A run to be made: `payload` is its problem and transcription (None for a vector problem), pickled, and its solver, pickled.
 
     `checkpoint` is the file of its state while it lasts, used if its process can write to that folder, as on this machine or on a cluster
@@ -70,7 +73,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """The outcome of a run."""
 
     status: str  # "finished", "crashed" (by an exception), "timeout", "out of memory" or "killed"
@@ -85,7 +88,7 @@ class Outcome:
     simulated: SimulationRecord = field(default_factory=SimulationRecord, repr=False)
 
 
-def perform(task: Task, report: Report | None = None) -> Outcome:
+def perform(task: RunTask, report: Report | None = None) -> RunOutcome:
     """The outcome of a run, made in this process from its checkpoint or its beginning. An exception is an outcome."""
     began = time.perf_counter()
     try:
@@ -97,16 +100,16 @@ def perform(task: Task, report: Report | None = None) -> Outcome:
 
         # Gradient tools that came to their end name no reason for it.
         if (stopped := front.stats.get("stopped", ENDED[0])) not in ENDED:
-            return Outcome(KILLED, f"it was stopped: {stopped}", wall_time=time.perf_counter() - began)
+            return RunOutcome(KILLED, f"it was stopped: {stopped}", wall_time=time.perf_counter() - began)
         content = to_bytes(front)
         samples.add(front.stats, front.stats["wall_time"], front.F)
         # The front alone knows the time before the run was resumed.
         seconds = max(time.perf_counter() - began, front.stats["wall_time"])
         found = _simulated(task, front)
-        return Outcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, simulated=found)
+        return RunOutcome(FINISHED, front.message, front=content, wall_time=seconds, history=samples.columns, simulated=found)
     except Exception as error:
         status, why = (MEMORY, str(error)) if is_memory_error(error) else (CRASHED, f"{type(error).__name__}: {error}")
-        return Outcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
+        return RunOutcome(status, " ".join(why.split()), traceback.format_exc(), wall_time=time.perf_counter() - began)
 
 
 def samples_path(checkpoint: Path) -> Path:
@@ -114,11 +117,11 @@ def samples_path(checkpoint: Path) -> Path:
     return checkpoint.with_suffix(".samples")
 
 
-def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Report | None) -> tuple[Front, Samples]:
+def _solved(task: RunTask, solver: Solver, problem: Any, scheme: Any, report: Report | None) -> tuple[Front, ArchiveSamples]:
     """The front of a run and its samples. With a checkpoint that cannot be used, the run begins again."""
     kept = task.checkpoint if task.checkpoint and os.access(task.checkpoint.parent, os.W_OK | os.X_OK) and keeps(solver) else None
     while True:
-        samples = Samples(task.evaluations, report, samples_path(kept) if kept else None)
+        samples = ArchiveSamples(task.evaluations, report, samples_path(kept) if kept else None)
         try:
             front = solver.solve(
                 problem,
@@ -140,7 +143,7 @@ def _solved(task: Task, solver: Solver, problem: Any, scheme: Any, report: Repor
             return front, samples
 
 
-def _simulated(task: Task, front: Front) -> SimulationRecord:
+def _simulated(task: RunTask, front: Front) -> SimulationRecord:
     """The final states of the points as simulated, if the task asks for it. Empty if that fails: the report tries again, and a run is not
     lost by it."""
     if task.verify is None or not front.dynamic or not front.was_simulated.all():
@@ -178,3 +181,118 @@ def _unpacked(payload: bytes) -> tuple[Any, Any]:
     """Problem and transcription: the runs that one process makes of them share the NLP that is kept with the problem."""
     problem, scheme = pickle.loads(payload)
     return (load(problem.address, **problem.data).compile() if isinstance(problem, Addressed) else problem), scheme
+
+
+# Samples
+
+COUNTS = ("evaluations", "inner_iterations", "gradient_solves", "work", "gradient_work")
+Report = Callable[[int, float], Any]
+"""Called at intervals with the evaluations and seconds so far."""
+
+
+class History(TypedDict, total=False):
+    """How a run converged, by columns with an entry for each sample; empty if it is not known.
+
+    Keys are its costs so far, "elapsed" seconds, and "F": the objectives (k, m) of its archive, all minimised.
+    """
+
+    evaluations: list[int]
+    inner_iterations: list[int]
+    gradient_solves: list[int]
+    work: list[int]
+    gradient_work: list[int]
+    elapsed: list[float]
+    F: list[list[list[float]]]
+
+
+class ArchiveSamples:
+    """About thirty samples of the archive, evenly spaced in evaluations, and reports of the progress at intervals; stored beside the
+    checkpoint, so that a resumed run has its whole history."""
+
+    def __init__(self, budget: int | None, report: Report | None = None, path: Path | None = None) -> None:
+        self._step, self._next, self._report, self._told, self._path = max(1, (budget or PLANNED) // 30), 0, report, 0.0, path
+        self.columns: dict[str, list[Any]] = {key: [] for key in History.__annotations__}
+        self._before, self._unsaved = _read(path), False
+
+    def note(self, progress: Any) -> None:
+        """To be called after every iteration."""
+        self._resume(progress.evaluations)
+        if progress.evaluations >= self._next:
+            self._next = (progress.evaluations // self._step + 1) * self._step
+            self.add(vars(progress), progress.elapsed, progress.F)
+            self._unsaved = self._path is not None
+        if self._unsaved:
+            self._write()
+        if self._report is not None and progress.elapsed - self._told >= 0.25:  # seconds
+            self._told = progress.elapsed
+            self._report(progress.evaluations, progress.elapsed)
+
+    def add(self, counts: Any, elapsed: float, F: Any) -> None:
+        """Add a sample."""
+        self._resume(counts["evaluations"] + 1)
+        for key in COUNTS:
+            self.columns[key].append(int(counts.get(key, 0)))
+        self.columns["elapsed"].append(float(elapsed))
+        self.columns["F"].append(F.tolist())
+
+    def _resume(self, evaluations: int) -> None:
+        """At the first call, begin with the stored samples before this count."""
+        if self._before is None:
+            return
+        count = sum(before < evaluations for before in self._before["evaluations"])
+        self.columns, self._before = {key: self._before[key][:count] for key in self.columns}, None
+        if count:
+            self._next = (self.columns["evaluations"][-1] // self._step + 1) * self._step
+
+    def _write(self) -> None:
+        assert self._path is not None
+        try:
+            write_whole(self._path, to_record(self.columns))
+            self._unsaved = False
+        except OSError as error:  # as for a checkpoint: the run goes on, and the next write may succeed
+            log.warning("%s", error)
+
+
+def _read(path: Path | None) -> dict[str, list[Any]] | None:
+    """The columns in a file; None if there is none, or it is damaged: then the history begins where the run is resumed."""
+    if path is None or not path.exists():
+        return None
+    try:
+        columns = checked(read_record(path), History)
+        if columns.keys() != History.__annotations__.keys():
+            raise ValueError(f"it has {', '.join(columns)}")
+    except (OSError, ValueError) as error:
+        log.warning("'%s' is damaged, so the history of its run is not complete: %s", path, error)
+        return None
+    return columns
+
+
+# Memory
+
+
+def is_memory_error(error: BaseException) -> bool:
+    """Whether an error says that memory could not be allocated. CasADi's do so as RuntimeErrors, whose text ends with what C++ says."""
+    return isinstance(error, MemoryError) or (isinstance(error, RuntimeError) and "bad_alloc" in str(error))
+
+
+def memory_message(error: BaseException) -> str:
+    """One line on such an error: what was asked for, where it is known, what the process had, and what takes less."""
+    peak = peak_memory()
+    had = "" if math.isnan(peak) else f"; the process had {peak:.0f} MB"
+    asked = " ".join(str(error).split())
+    return f"out of memory{f': {asked}' if asked else ''}{had}; a coarser transcription, or fewer at a time, takes less"
+
+
+def peak_memory() -> float:
+    """Most memory that this process has had, MB; no number where the system does not say."""
+    status = Path("/proc/self/status")
+    # On Linux, what `getrusage` says of a process is at least what the one that started it had.
+    for line in status.read_text().splitlines() if status.exists() else ():
+        if line.startswith("VmHWM:"):
+            return float(line.split()[1]) / 2**10
+    try:
+        import resource
+    except ImportError:  # only Unix has it
+        return math.nan
+    # Kilobytes, but bytes on a Mac.
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)

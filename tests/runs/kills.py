@@ -189,7 +189,7 @@ def running_cluster() -> Iterator[Cluster]:
 
 def kill_workers(kills: int, rng: np.random.Generator) -> int:
     """Kill workers of a cluster while it makes a study, each replaced by another; the numbers are those of this machine alone."""
-    from runs.execution.workers import cluster
+    from runs.execution.processes import cluster
 
     done = number = 0
     with tempfile.TemporaryDirectory() as folder, running_cluster() as made:

@@ -377,7 +377,7 @@ def test_published_problems_each_in_its_own_process(capfd):
     (late,) = measured("standard", "moon_landing", seconds=0.05)
     with Steps("published problems", 1) as steps:
         lines, ended = optima.lines_of("defaults", "no_such_problem", Effort(), steps)
-    assert late.who == optima.LATE and (lines, ended) == ([], optima.CRASHED) and "no_such_problem" in capfd.readouterr().err
+    assert late.who == optima.TIMEOUT and (lines, ended) == ([], optima.CRASHED) and "no_such_problem" in capfd.readouterr().err
 
 
 @pytest.mark.slow
@@ -401,7 +401,7 @@ def test_verified_optima_that_differ_are_told():
     assert all(optima.agreement("moon_landing", lines, "").who == word for word, lines in verdict.items())
     fixed = found(1.4203, 1.4203) + found(1.4303, words=optima.WORDS[-1:])
     assert optima.agreement("moon_landing", fixed, "").who == optima.AGREED, "linear controls on nodes are somewhat worse"
-    assert optima.agreement("moon_landing", [], optima.LATE).who == f"-, {optima.LATE}"
+    assert optima.agreement("moon_landing", [], optima.TIMEOUT).who == f"-, {optima.TIMEOUT}"
 
 
 @pytest.mark.parametrize(

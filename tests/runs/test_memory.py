@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from runs.cli import main
-from runs.execution.memory import is_memory_error, peak_memory
+from runs.execution.task import is_memory_error, peak_memory
 
 ROOT = Path(__file__).parents[2]
 
@@ -37,7 +37,7 @@ def test_want_of_memory_is_one_line(tmp_path, monkeypatch, capsys, error, words)
 
 def test_the_peak_of_a_process_is_its_own():
     """Not that of the process that started it, which is what `getrusage` says on Linux."""
-    code = "from runs.execution.memory import peak_memory; print(peak_memory()); block = b'x' * (100 * 2**20); print(peak_memory())"
+    code = "from runs.execution.task import peak_memory; print(peak_memory()); block = b'x' * (100 * 2**20); print(peak_memory())"
     block = b"x" * (400 * 2**20)
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     before, after = map(float, answer.stdout.split())

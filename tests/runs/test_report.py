@@ -17,7 +17,7 @@ from problems import load
 from runs import Study, gd, igd
 from runs.batch.store import Store
 from runs.cli import main
-from runs.execution.task import Outcome
+from runs.execution.task import RunOutcome
 from runs.measures.references import look_up
 from runs.report.comparison import comparisons
 from runs.report.published import papers, published_tables
@@ -213,7 +213,7 @@ def test_nothing_to_report_on(tmp_path, capsys):
     assert "contains no study" in capsys.readouterr().err
     batch = study()
     with Store.claim(tmp_path / "out", batch.definition()) as store:
-        store.keep(store.run(store.cells[0], 1), Outcome("crashed", "it broke"))
+        store.keep(store.run(store.cells[0], 1), RunOutcome("crashed", "it broke"))
     with pytest.raises(ValueError, match="nothing to report on yet"):
         report(tmp_path / "out")
     with pytest.raises(ValueError, match="another study"):

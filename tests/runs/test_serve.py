@@ -23,13 +23,12 @@ from synthetic_fronts import black_box, flights
 from test_study import Inline
 
 from runs import Study
-from runs.batch import progress as progress_module
-from runs.batch.progress import ProgressFile, read_progress
+from runs.batch.running import PROGRESS_FILE, STALE, StudyDisplay, read_progress
 from runs.batch.store import Store
 from runs.browser.live import followed
 from runs.browser.server import Server
 from runs.cli import main
-from runs.execution.samples import Samples
+from runs.execution.task import ArchiveSamples
 
 pytest.importorskip("plotly")
 
@@ -240,16 +239,16 @@ def test_the_points_so_far_of_runs_that_have_not_ended_are_shown(out):
     stated = study(runs=2)
     cell = stated.cells[0]
     (run,) = (run for run in Store.open(out).runs(2) if run.cell.labels == cell.labels and run.number == 2)
-    samples = Samples(60, path=run.path.with_suffix(".samples"))
+    samples = ArchiveSamples(60, path=run.path.with_suffix(".samples"))
     counts = {"evaluations": 20, "inner_iterations": 0, "gradient_solves": 0, "work": 0, "gradient_work": 0}
     samples.note(SimpleNamespace(**counts, elapsed=1.0, F=np.array([[1.0, -3.0], [2.0, -6.0]])))
     with Store.claim(out, stated.definition()):
         pass
-    going = [progress_module.Going(cell.folder, 2, 31, 1.5)]
-    with served(out) as client, ProgressFile(out, stated.objectives, lambda: (going, 12.0)) as file:
-        file.refresh()
+    with served(out) as client, StudyDisplay("a", [run], [run], False, folder=out, goals=stated.objectives) as display:
+        display.reporter(run)(31, 1.5)
+        display.refresh()
         status = client.until(lambda status: status["running"] == 1)
-        assert (status["alive"], status["waiting"], status["left"]) == (True, 1, 12.0)
+        assert (status["alive"], status["waiting"]) == (True, 1) and status["left"] > 0.0
         assert status["going"] == [{"name": f"{cell.name}, run 2", "evaluations": 31, "budget": 60, "elapsed": 1.5}]
         (points,) = client.json("/going.json")["glide, dfet:2x2"]
         assert points == {"solver": "plain", "number": 2, "objectives": [[1.0, 2.0], [3.0, 6.0]]}  # in the user's senses
@@ -264,8 +263,9 @@ def test_before_the_first_run_has_ended_the_objectives_are_known(tmp_path):
     stated = study()
     with Store.claim(tmp_path / "out", stated.definition()):
         pass
-    with ProgressFile(tmp_path / "out", stated.objectives, lambda: ([], None)) as file, served(tmp_path / "out") as client:
-        file.refresh()
+    folder = tmp_path / "out"
+    with StudyDisplay("a", [], [], False, folder=folder, goals=stated.objectives) as display, served(folder) as client:
+        display.refresh()
         data = client.until(lambda found: found["comparisons"], "/data.json")
         assert [goal["name"] for goal in data["comparisons"][0]["goals"]] == ["time", "distance"]
         assert data["comparisons"][0]["runs"] == [] and client.json("/status.json")["waiting"] == 2
@@ -273,29 +273,28 @@ def test_before_the_first_run_has_ended_the_objectives_are_known(tmp_path):
 
 def test_progress_that_is_old_or_damaged_is_none(tmp_path):
     assert read_progress(tmp_path) is None
-    file = ProgressFile(tmp_path, {}, lambda: ([], None))
-    file.refresh()
+    display = StudyDisplay("a", [], [], False, folder=tmp_path)
+    display.refresh()
     assert read_progress(tmp_path) is not None
-    path = tmp_path / progress_module.FILE
-    old = time.time() - 2 * progress_module.STALE
+    path = tmp_path / PROGRESS_FILE
+    old = time.time() - 2 * STALE
     os.utime(path, (old, old))
     assert read_progress(tmp_path) is None
     path.write_text("{}", encoding="utf-8")
     assert read_progress(tmp_path) is None
-    file.__exit__(None, None, None)
+    display.__exit__(None, None, None)
     assert not path.exists()
 
 
 @pytest.mark.slow
 def test_a_study_says_how_it_proceeds_and_leaves_nothing_of_that_behind(tmp_path, monkeypatch):
-    monkeypatch.setattr(progress_module, "EVERY", 0.0)
     told = []
-    original = ProgressFile.refresh
-    monkeypatch.setattr(ProgressFile, "refresh", lambda self: original(self) or told.append(read_progress(tmp_path / "out")))
+    original = StudyDisplay.refresh
+    monkeypatch.setattr(StudyDisplay, "refresh", lambda self: original(self) or told.append(read_progress(tmp_path / "out")))
     Study("slow", problems={"glide": glide()}, solvers={"slow": Slow()}, evaluations=60, runs=1, seed=1).run(tmp_path / "out")
     known = [one for one in told if one and one.going]
     assert known and {run.number for one in known for run in one.going} == {1} and known[0].goals["glide"][0].name == "time"
-    assert not (tmp_path / "out" / progress_module.FILE).exists()
+    assert not (tmp_path / "out" / PROGRESS_FILE).exists()
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from macs import NSGA2
 from macs.fronts.files import to_bytes
 from runs import Study
 from runs.batch.store import Store, _difference, locked, reason
-from runs.execution.task import Outcome, samples_path
+from runs.execution.task import RunOutcome, samples_path
 from runs.files import from_record, to_record
 
 FRONT = black_box(4)
@@ -39,7 +39,7 @@ def store(tmp_path: Path):
 
 def finish(store: Store, number: int = 0, seconds: float = 2.0, **more) -> None:
     """Keep the outcome of one of all runs."""
-    outcome = Outcome("finished", front=content(), wall_time=seconds, **more)
+    outcome = RunOutcome("finished", front=content(), wall_time=seconds, **more)
     store.keep(list(store.runs())[number], outcome)
 
 
@@ -67,7 +67,7 @@ def test_what_is_kept_is_found_again(store):
 
 @pytest.mark.parametrize("status", ["crashed", "timeout", "out of memory", "killed"])
 def test_what_failed_has_its_reason_and_no_front(store, status):
-    store.keep(list(store.runs())[2], Outcome(status, message="no air", traceback="line 1", wall_time=1.0))
+    store.keep(list(store.runs())[2], RunOutcome(status, message="no air", traceback="line 1", wall_time=1.0))
     run = list(store.runs())[2]
     assert (run.status, run.finished, run.message, run.traceback, run.path.exists()) == (status, False, "no air", "line 1", False)
     assert from_record(run.path.with_suffix(".json").read_bytes())["front"] is None
@@ -83,7 +83,7 @@ def test_a_finished_run_leaves_neither_checkpoint_nor_samples_and_a_failed_one_b
     assert checkpoint == run.path.with_suffix(".checkpoint").absolute() and checkpoint.parent.is_dir()
     for path in (checkpoint, samples_path(checkpoint)):
         path.write_bytes(b"half")
-    store.keep(run, Outcome("timeout"))
+    store.keep(run, RunOutcome("timeout"))
     assert checkpoint.exists() and samples_path(checkpoint).exists()
     finish(store)
     assert not checkpoint.exists() and not samples_path(checkpoint).exists()
@@ -217,7 +217,7 @@ def test_a_record_is_readable_and_written_once(store):
 def test_the_table_counts_each_cell_and_has_the_median_of_its_times(store):
     finish(store, 0, seconds=10.0)
     finish(store, 1, seconds=30.0)
-    store.keep(list(store.runs())[2], Outcome("crashed", message="x" * 300, wall_time=99.0))
+    store.keep(list(store.runs())[2], RunOutcome("crashed", message="x" * 300, wall_time=99.0))
     lines = str(store.summary()).split("\n")
     small, large = next(line for line in lines if "small" in line).split(), next(line for line in lines if " large" in line).split()
     assert lines[0] == "by hand: 2 of 4 runs finished"
@@ -233,7 +233,7 @@ def test_only_the_first_twenty_reasons_are_listed(tmp_path):
     with Store.claim(tmp_path, study(runs=11).definition()) as store:
         for count, last in ((20, "run 9 of"), (22, "and 2 more")):
             for run in list(store.runs())[:count]:
-                store.keep(run, Outcome("crashed"))
+                store.keep(run, RunOutcome("crashed"))
             lines = str(store.summary()).split("\n")
             large = next(line for line in lines if " large" in line).split()
             assert large[-4:] == ["0", str(count - 11), str(22 - count), "-"]

@@ -13,10 +13,10 @@ from problems.cases.reentry.cases import case1_reference
 from problems.cases.reentry.statement import MASS
 from runs import Study
 from runs.batch import file as studyfile
-from runs.batch.display import StudyDisplay
+from runs.batch.running import StudyDisplay
 from runs.batch.store import Store
 from runs.cli import main
-from runs.execution.task import Outcome
+from runs.execution.task import RunOutcome
 from transcription import DFET, Collocation, SingleShooting, parse
 
 GLIDE = (Path(__file__).parent / "misbehaving.py").read_text(encoding="utf-8")
@@ -87,7 +87,7 @@ def test_the_runs_of_some_solvers(capsys):
 def test_status_says_what_is_wrong(capsys):
     study = Study.load("gliders.toml", trust=True)
     with Store.claim("out", study.definition()) as store:
-        store.keep(store.run(study.cells[0], 1), Outcome("killed", "its process was killed by SIGKILL"))
+        store.keep(store.run(study.cells[0], 1), RunOutcome("killed", "its process was killed by SIGKILL"))
     assert main(["study", "status", "out"]) == 1
     said = capsys.readouterr().out
     assert "0 of 2 runs finished" in said and "killed by SIGKILL" in said
@@ -251,7 +251,7 @@ def test_a_terminal_sees_the_runs_that_are_going_on(here):
     stream = Terminal()
     with StudyDisplay("gliders", runs, runs, shown=True, stream=stream) as display:
         display.reporter(runs[1])(40, 1.0)
-        display.ended(runs[0], Outcome("crashed", "ValueError: no [such] thing"))
+        display.ended(runs[0], RunOutcome("crashed", "ValueError: no [such] thing"))
     said = stream.getvalue()
     assert "run 2" in said and "40 / 60 evaluations" in said and "1 failed, 1 left" in said
     assert "run 1 of glide.py:glide, dfet:2x2, plain crashed: ValueError: no [such] thing" in " ".join(said.split())

@@ -15,7 +15,7 @@ from test_study import Inline, numbers, slow, stamps, wait_for
 
 from runs.batch.running import WorkersLost
 from runs.cli import main
-from runs.execution.workers import cluster
+from runs.execution.processes import cluster
 
 
 @pytest.fixture
