@@ -21,10 +21,9 @@ from macs.front import Front
 from problems.compiled import Objective
 
 from ..batch.cells import Cell
-from ..batch.progress import Progress, read_progress
-from ..batch.store import MISSING, Store, StoredRun, Summary
-from ..execution.samples import History
-from ..execution.task import samples_path
+from ..batch.running import ProgressRecord, read_progress
+from ..batch.store import MISSING, Store, StoredRun, StudySummary
+from ..execution.task import History, samples_path
 from ..files import checked, read_record
 from ..report.comparison import compared, comparisons
 from ..report.report import tables_across
@@ -265,7 +264,7 @@ class FollowedStudy(Followed):
         except (ValueError, OSError) as error:
             return {"comparisons": {}, "tables": [], "finished": 0, "trouble": _line(error)}
 
-    def _read_fronts(self, summary: Summary) -> list[str]:
+    def _read_fronts(self, summary: StudySummary) -> list[str]:
         """Read the fronts that are new; returns why others cannot be read now."""
         unreadable: list[str] = []
         before, self._read = self._read, {}
@@ -286,7 +285,7 @@ class FollowedStudy(Followed):
             self._read[key] = run, front, msgspec.Raw(msgspec.json.encode(data))
         return unreadable
 
-    def _read_samples(self, summary: Summary, progress: Progress | None) -> dict[Key, Sampled]:
+    def _read_samples(self, summary: StudySummary, progress: ProgressRecord | None) -> dict[Key, Sampled]:
         """The runs that are being made, each with its last sample if it has one."""
         if progress is None:
             return {}
@@ -334,7 +333,7 @@ class FollowedStudy(Followed):
                 found.append({"solver": run.cell.solver, "number": run.number, "objectives": objectives})
         return found
 
-    def _status(self, summary: Summary, progress: Progress | None) -> dict[str, Any]:
+    def _status(self, summary: StudySummary, progress: ProgressRecord | None) -> dict[str, Any]:
         """How many runs of each cell there are in which state, and the runs that are being made."""
         going = self._sampled
 

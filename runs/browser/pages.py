@@ -14,7 +14,7 @@ from macs.front import Front
 from macs.io.atomic import check_target, write_whole
 from problems.compiled import Objective
 
-from ..batch.store import MISSING, Store, StoredRun, Summary, reason
+from ..batch.store import MISSING, Store, StoredRun, StudySummary, reason
 from ..measures.attainment import attainment, band, staircase
 from ..measures.indicators import minimised, pieces, truth
 from ..measures.references import Reference
@@ -99,7 +99,7 @@ def run_state(run: StoredRun) -> str:
     return "finished" if run.finished else "missing" if run.status == MISSING else "failed"
 
 
-def cells_data(summary: Summary, state: Callable[[StoredRun], str]) -> list[dict[str, Any]]:
+def cells_data(summary: StudySummary, state: Callable[[StoredRun], str]) -> list[dict[str, Any]]:
     """How many runs of each cell there are in which state, a function of the run, and their median time."""
     cells = []
     for cell, runs in summary.cells.items():
@@ -109,7 +109,7 @@ def cells_data(summary: Summary, state: Callable[[StoredRun], str]) -> list[dict
     return cells
 
 
-def failures_data(summary: Summary) -> list[dict[str, str]]:
+def failures_data(summary: StudySummary) -> list[dict[str, str]]:
     """Why runs failed, with the traceback of at most 200 of them."""
     failed = [run for run in summary.runs if run_state(run) == "failed"]
     return [

@@ -21,8 +21,7 @@ from transcription.inner.base import iteration_work
 
 from ..batch.cells import Cell
 from ..batch.store import Store, StoredRun
-from ..execution.samples import COUNTS
-from ..execution.task import CRASHED, MEMORY, TIMEOUT, FinalStates, final_states, record
+from ..execution.task import COUNTS, CRASHED, MEMORY, TIMEOUT, FinalStates, final_states, record
 from ..files import errors_begin_with
 from ..measures.attainment import History
 from ..measures.indicators import additive_epsilon, gd, hypervolume, igd, igd_plus

@@ -23,7 +23,7 @@ from macs.fronts.provenance import versions
 from macs.io.atomic import check_target, read_whole, write_whole
 from macs.io.text import counted, duration
 
-from ..batch.store import Store, Summary
+from ..batch.store import Store, StudySummary
 from ..files import DATA_BYTES
 from .published import with_count
 from .tables import Table
@@ -166,7 +166,7 @@ class Page:
         self._pictures[file] = content.getvalue()
         self._parts.append(f"![{name.replace('-', ' ')}]({file})\n")
 
-    def save(self, summary: Summary, study: Mapping[str, Any]) -> list[Path]:
+    def save(self, summary: StudySummary, study: Mapping[str, Any]) -> list[Path]:
         """Write the page and its pictures; returns their paths."""
         times = [run.wall_time for run in summary.runs]
         first = summary.runs[0].front.stats["versions"]

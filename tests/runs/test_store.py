@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from synthetic_fronts import black_box
 from macs import NSGA2
 from macs.fronts.files import to_bytes
 from runs import Study
-from runs.batch.store import Store, _difference, locked, reason
+from runs.batch.store import Store, _difference
 from runs.execution.task import RunOutcome, samples_path
 from runs.files import from_record, to_record
 
@@ -206,11 +205,6 @@ def test_what_is_no_study_of_this_version_says_so(store):
         assert str(refused.value) == words
 
 
-def test_a_record_is_readable_and_written_once(store):
-    text = (store.path / "study.json").read_text(encoding="utf-8")
-    assert json.loads(text)["content"]["study"]["name"] == "by hand" and text.count("\n") > 20
-
-
 # What the table says
 
 
@@ -240,10 +234,6 @@ def test_only_the_first_twenty_reasons_are_listed(tmp_path):
             assert sum(line.endswith(": crashed") for line in lines) == 20 and lines[-1].startswith(last)
 
 
-def test_where_nothing_failed_the_table_is_all(store):
-    assert str(store.summary()) == str(store.summary()).rstrip()
-
-
 def test_addresses_are_trusted_only_where_that_is_said(store):
     assert [next(Store.open(store.path, trust).runs()).trust for trust in (True, False)] == [True, False]
     assert next(Store.open(store.path).runs()).trust is False
@@ -254,14 +244,3 @@ def test_the_first_difference_of_two_tables():
     assert _difference({"a": 1}, {"a": 1, "b": 2}) == "b is null there and 2 here"
     assert _difference({"a": {"b": {"c": 1}}}, {"a": {"b": {"c": "x"}}}) == 'a.b.c is 1 there and "x" here'
     assert _difference({"a": {"b": 1}}, {"a": 3}, "cell: ") == 'cell: a is {"b": 1} there and 3 here'
-
-
-def test_reasons():
-    assert reason("crashed", "ValueError: no such thing") == "crashed: ValueError: no such thing" and reason("killed", "") == "killed"
-
-
-def test_a_lock_is_free_again_after_its_context(tmp_path):
-    taken = f"'{tmp_path}' is being written by another process"
-    for _ in range(2):
-        with locked(tmp_path / ".lock"), pytest.raises(ValueError, match=taken), locked(tmp_path / ".lock"):
-            pass

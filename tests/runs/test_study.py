@@ -1,16 +1,12 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
-import pickle
 import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import replace
-from multiprocessing import get_context
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +15,7 @@ from misbehaving import Crashing, Dying, Faltering, Hanging, Hungry, Plain, Slow
 
 from runs import Study
 from runs.batch.store import Store
-from runs.execution.task import perform
+from runs.execution.task import RunOutcome, perform
 from runs.report.report import Report
 from transcription import DFET
 
@@ -115,18 +111,12 @@ def test_the_runs_of_some_solvers_first(tmp_path):
     assert not (tmp_path / "new").exists()
 
 
-@pytest.mark.parametrize("how", ["here", "threads", pytest.param("processes", marks=pytest.mark.slow)])
-def test_numbers_do_not_depend_on_who_makes_the_runs(made, tmp_path, how):
-    if how == "here":
-        found = study().run(tmp_path / "out", executor=Inline())
-    elif how == "threads":
-        with ThreadPoolExecutor(1) as threads:
-            found = study().run(tmp_path / "out", executor=threads)
-    else:
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as processes:
-            found = study().run(tmp_path / "out", executor=processes)
+def test_numbers_do_not_depend_on_who_makes_the_runs(made, tmp_path):
+    here = study().run(tmp_path / "here", executor=Inline())
+    with ThreadPoolExecutor(1) as threads:
+        apart = study(runs=1).run(tmp_path / "threads", executor=threads)
     expected = numbers(made[1])
-    assert found.finished == 3 and numbers(found).items() <= expected.items()
+    assert here.finished == 3 and numbers(here).items() <= expected.items() and numbers(apart).items() <= expected.items()
 
 
 # Seeds
@@ -159,27 +149,12 @@ def late(tmp_path_factory):
     return max(4.0, 10.0 * run.wall_time)
 
 
-@pytest.fixture(scope="module")
-def troubled(late, tmp_path_factory):
-    """Every kind of failure beside runs that are none of these."""
-    folder = tmp_path_factory.mktemp("troubled")
-    lives = folder / "lives"
-    lives.write_bytes(b"x")
-    solvers = {
-        "crash": Crashing(),
-        "hang": Hanging(),
-        "hungry": Hungry(),
-        "dead": Dying(),
-        "once": Dying(lives=str(lives)),
-        "plain": Plain(),
-    }
-    trouble = study(solvers=solvers, runs=1, time_limit=late)
-    return trouble, folder / "out", trouble.run(folder / "out")
-
-
 @pytest.mark.slow
-def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(troubled, late):
-    _, _, summary = troubled
+def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(late, tmp_path):
+    lives = tmp_path / "lives"
+    lives.write_bytes(b"x")
+    solvers = {"crash": Crashing(), "hang": Hanging(), "hungry": Hungry(), "dead": Dying(), "once": Dying(lives=str(lives))}
+    summary = study(solvers={**solvers, "plain": Plain()}, runs=1, time_limit=late).run(tmp_path / "out")
     status = {cell.solver: [run.status for run in runs] for cell, runs in summary.cells.items()}
     assert status == {
         "crash": ["crashed"],
@@ -201,44 +176,25 @@ def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(troubl
     assert "2 of 6 runs finished" in text and "run 1 of glide, dfet:2x2, crash: crashed: ArithmeticError: the root of all evil" in text
 
 
-def test_what_was_killed_or_late_is_made_again_and_what_crashed_if_asked(troubled):
-    trouble, folder, _ = troubled
-    before = stamps(folder)
-    asked = []
+def test_what_was_killed_or_late_is_made_again_and_what_crashed_if_asked(tmp_path):
+    batch, statuses, asked = study(runs=6), ("crashed", "timeout", "out of memory", "killed", "missing"), []
+    with Store.claim(tmp_path, batch.definition()) as store:
+        runs = list(store.runs())
+        for run, status in zip(runs, statuses[:-1], strict=False):
+            store.keep(run, RunOutcome(status))
+        runs[5].path.write_bytes(b"damaged")
 
-    class Asked(Inline):
+    class Asked(Executor):
         def submit(self, function, task):
-            asked.append(pickle.loads(task.payload[1]))
-            return super().submit(function, replace(task, payload=trouble.payloads["glide", "dfet:2x2", "crash"]))
+            asked.append(next(run.number for run in runs if run.seed == task.seed))
+            future = Future()
+            future.set_result(RunOutcome("crashed"))
+            return future
 
-    trouble.run(folder, executor=Asked())
-    assert [type(one) for one in asked] == [Hanging, Hungry, Dying]
-    asked.clear()
-    trouble.run(folder, executor=Asked(), retry=True)
-    assert [type(one) for one in asked] == [Crashing, Hanging, Hungry, Dying] and stamps(folder) == before
-
-
-@pytest.mark.slow
-def test_damaged_and_missing_files_are_told_and_made_again(made, tmp_path):
-    first = study().run(tmp_path / "out", executor=Inline())
-    expected = numbers(first)
-    paths = [run.path for run in first.runs]
-    paths[0].write_bytes(paths[0].read_bytes()[:5000])
-    paths[1].unlink()
-    record = first.runs[2].path.with_suffix(".json")
-    content = record.read_bytes()
-    record.unlink()
-    status = study().status(tmp_path / "out")
-    assert [run.status for run in status.runs] == ["unreadable", "missing", "finished"]
-    assert status.runs[2].history == {} and status.runs[2].wall_time == 0.0
-    assert "1 of 3 runs finished" in str(status) and "0001.nc' is damaged" in str(status)
-    for damaged in (b"{ not", content[:-20], content.replace(b'"message": ""', b'"message": "!"'), content.replace(b"content", b"contant")):
-        record.write_bytes(damaged)
-        status = study().status(tmp_path / "out")
-        assert status.runs[2].status == "unreadable" and "0003.json' is damaged" in str(status) and status.runs[2].history == {}
-    again = study().run(tmp_path / "out", executor=Inline())
-    assert again.finished == 3 and paths[0].with_name("0001.nc.unreadable").stat().st_size == 5000
-    assert {key: value[0] for key, value in numbers(again).items()} == {key: value[0] for key, value in expected.items()}
+    batch.run(tmp_path, executor=Asked())
+    assert asked == [2, 3, 4, 5, 6]
+    batch.run(tmp_path, executor=Asked(), retry=True)
+    assert asked[5:] == [1, 2, 3, 4, 5, 6]
 
 
 @pytest.mark.slow
@@ -264,8 +220,7 @@ def test_a_full_disk_is_told_and_costs_nothing_that_is_finished(tmp_path, monkey
     assert study().run(tmp_path / "out", executor=Inline()).finished == 3 and before.items() <= stamps(tmp_path).items()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("damaged", [False, True])
+@pytest.mark.parametrize("damaged", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_run_goes_on_where_it_was(tmp_path, damaged):
     batch = study(solvers={"faltering": Faltering(folder=str(tmp_path))}, runs=1, evaluations=200)
     spent = tmp_path / "spent"
@@ -368,106 +323,44 @@ def test_ctrl_c_stops_promptly_and_keeps_what_is_finished(tmp_path):
 # Wrong definitions
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"runs": 0}, "runs must be a whole number of at least 1"),
-        ({"runs": True}, "runs"),
-        ({"seed": -1}, "seed"),
-        ({"evaluations": 0}, "evaluations must be a whole number"),
-        ({"evaluations": {"glider": 10}}, "no problem 'glider'"),
-        ({"solvers": "mac"}, "did you mean macs"),
-        ({"solvers": {"a": {"solver": "macs", "agent": 10}}}, "setting of solver 'macs' 'agent', did you mean agents"),
-        ({"solvers": {"a": {"solver": "macs", "agents": 1}}}, "agents must be"),
-        ({"solvers": []}, "solvers: there are none"),
-        ({"solvers": [Plain(), Plain(agents=5)]}, "'plain' is there twice"),
-        ({"problems": "godard"}, "did you mean 'goddard'"),
-        ({"problems": {"a": 7}}, "'a' must be a name"),
-        ({"transcriptions": "dfat:4x6"}, "unknown transcription 'dfat:4x6'"),
-        ({"transcriptions": {"glide": "dfet:2x2", "other": "dfet:2x2"}}, "no problem 'other'"),
-        ({"transcriptions": 3}, "must be a word such as dfet:4x6"),
-        ({"inner": "autos"}, "unknown inner level 'autos', did you mean auto?"),
-        ({"tolerance": 0}, "tolerance must be a positive number"),
-        ({"time_limit": "long"}, "time_limit must be a positive number"),
-        ({"start": "smoth"}, "unknown start 'smoth', did you mean smooth?"),
-        ({"start": {"spred": 0.1}}, "unknown setting of start 'spred', did you mean spread?"),
-        ({"start": {"spread": 2}}, "Smooth: spread must be in (0, 1], not 2"),
-        ({"start": [1.0]}, "start must be 'uniform', 'smooth', or a table"),
-    ],
+WRONG = (
+    ({"runs": 0}, "runs must be a whole number of at least 1"),
+    ({"runs": True}, "runs"),
+    ({"seed": -1}, "seed"),
+    ({"evaluations": 0}, "evaluations must be a whole number"),
+    ({"evaluations": {"glider": 10}}, "no problem 'glider'"),
+    ({"solvers": "mac"}, "did you mean macs"),
+    ({"solvers": {"a": {"solver": "macs", "agent": 10}}}, "setting of solver 'macs' 'agent', did you mean agents"),
+    ({"solvers": {"a": {"solver": "macs", "agents": 1}}}, "agents must be"),
+    ({"solvers": []}, "solvers: there are none"),
+    ({"solvers": [Plain(), Plain(agents=5)]}, "'plain' is there twice"),
+    ({"problems": "godard"}, "did you mean 'goddard'"),
+    ({"problems": {"a": 7}}, "'a' must be a name"),
+    ({"transcriptions": "dfat:4x6"}, "unknown transcription 'dfat:4x6'"),
+    ({"transcriptions": {"glide": "dfet:2x2", "other": "dfet:2x2"}}, "no problem 'other'"),
+    ({"transcriptions": 3}, "must be a word such as dfet:4x6"),
+    ({"inner": "autos"}, "unknown inner level 'autos', did you mean auto?"),
+    ({"tolerance": 0}, "tolerance must be a positive number"),
+    ({"time_limit": "long"}, "time_limit must be a positive number"),
+    ({"start": "smoth"}, "unknown start 'smoth', did you mean smooth?"),
+    ({"start": {"spred": 0.1}}, "unknown setting of start 'spred', did you mean spread?"),
+    ({"start": {"spread": 2}}, "Smooth: spread must be in (0, 1], not 2"),
+    ({"start": [1.0]}, "start must be 'uniform', 'smooth', or a table"),
+    *(({"name": name}, "its name is that of a folder") for name in ("../evil", "..", "a\\b", "a\0b")),
 )
-def test_a_definition_that_makes_no_sense_is_refused_in_its_own_words(changes, words):
-    with pytest.raises(ValueError) as refused:
-        study(**changes)
-    assert words in str(refused.value) and "study 'glides'" in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"seed": 2}, "seed is 1 there and 2 here"),
-        ({"evaluations": 61}, "evaluations is 60 there and 61 here"),
-        ({"solvers": {"plain": Plain(agents=5)}}, "agents is 10 there and 5 here"),
-        ({"solvers": {"other": Plain()}}, "plain' is there but not here"),
-        ({"problems": {"glide": glide(speed=2.0)}}, "fingerprint"),
-        ({"tolerance": 1e-5}, "tolerance"),
-        ({"start": "smooth"}, "start is null there"),
-    ],
-)
-def test_another_study_in_the_same_folder_is_refused(made, changes, words):
-    before = stamps(made[0])
-    with pytest.raises(ValueError, match="contains another study") as refused:
-        study(**changes).run(made[0])
-    assert words in str(refused.value) and stamps(made[0]) == before
-
-
-@pytest.mark.slow
-def test_runs_begin_as_the_study_says(tmp_path):
-    def made(start) -> list[list[float]]:
-        given = {"solvers": {"nsga2": {"solver": "nsga2", "population": 6, "degree": "sum"}}, "evaluations": 12, "runs": 1}
-        one = study(start=start, **given).run(tmp_path / str(start), executor=Inline())
-        assert one.runs[0].front.stats["population"]["generations"] == 2
-        return one.runs[0].front.F.tolist()
-
-    assert made("uniform") == made(None) != made("smooth") == made({"spread": 0.2})  # without a guess, uniform is the default
-
-
-def test_wrong_calls_of_run(tmp_path):
-    (tmp_path / "letter.txt").write_text("dear", encoding="utf-8")
-    for out, more, words in (
-        (tmp_path, {}, "other things, 'letter.txt'"),
-        (tmp_path / "letter.txt", {}, "not a folder"),
-        (tmp_path / "new", {"jobs": 0}, "jobs"),
-        (tmp_path / "new", {"executor": 4}, "executor"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            study().run(out, **more)
-    assert [path.name for path in tmp_path.iterdir()] == ["letter.txt"]
-
-
-@pytest.mark.parametrize("content", [None, "", "{", "[1]", '{"crc32": 1, "content": {}}', '{"format": "macs study"}'])
-def test_a_folder_that_cannot_be_read_is_one_clear_line(tmp_path, content):
-    if content is not None:
-        (tmp_path / "study.json").write_text(content, encoding="utf-8")
-    with pytest.raises(ValueError) as refused:
-        Store.open(tmp_path)
-    assert str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
+def test_a_definition_that_makes_no_sense_is_refused_in_its_own_words():
+    for changes, words in WRONG:
+        with pytest.raises(ValueError) as refused:
+            Study(**{"name": "glides"} | KEEP | changes)
+        assert words in str(refused.value) and ("study 'glides'" in str(refused.value) or "name" in changes), changes
 
 
 def test_what_other_processes_cannot_have_is_refused_before_any_work(monkeypatch):
     monkeypatch.setattr(Plain, "__module__", "__main__")
     with pytest.raises(ValueError, match="cannot import Plain from a script"):
         study()
-
-
-def test_records_are_plain_text(made):
-    record = json.loads((made[0] / "study.json").read_text(encoding="utf-8"))["content"]
-    assert record["study"]["cells"][0]["problem"] == "glide" and record["study"]["seed"] == 1
-
-
-@pytest.mark.parametrize("name", ["../evil", "/evil", "a\\b", "..", "a\0b"])
-def test_the_name_of_a_study_leads_to_no_other_folder(name):
-    with pytest.raises(ValueError, match="its name is that of a folder"):
-        Study(name, **KEEP)
 
 
 def test_a_study_and_its_report_print_on_one_line():

@@ -10,7 +10,7 @@ from macs import NSGA2
 from problems import Problem
 from runs import Study
 from runs.batch.store import Store
-from runs.report.comparison import EACH, comparisons
+from runs.report.comparison import comparisons
 from transcription import DFET, Smooth, parse
 
 APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform"}}
@@ -32,14 +32,6 @@ def test_cells():
     assert same.seed(1, 1) == plain.seed(1, 1) and same.to_dict() == plain.to_dict(), "others do not notice"
 
 
-def test_a_budget_of_its_own_for_each_problem():
-    two = {"slow": glide(), "fast": glide()}
-    made = study(problems=two, terms={"macs": {**APART["macs"], "evaluations": {"slow": 40, "fast": 9000}}}, evaluations=60_000)
-    assert {cell.problem: cell.evaluations for cell in made.cells if cell.solver == "macs"} == {"slow": 40, "fast": 9000}
-    assert {cell.problem: cell.evaluations for cell in made.quick().cells if cell.solver == "macs"} == {"slow": 40, "fast": 75}
-    assert all(cell.terms["evaluations"] == cell.evaluations for cell in made.cells if cell.solver == "macs"), "others' do not matter"
-
-
 @pytest.mark.slow
 def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
     assert study().run(tmp_path / "out", executor=Inline()).finished == 6
@@ -57,15 +49,6 @@ def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
         ValueError, match=r"another study: glide, dfet:3x2, macs: details\.terms\.evaluations|evaluations is 40 there and 30"
     ):
         study(terms={"macs": {**APART["macs"], "evaluations": 30}}).run(tmp_path / "out", executor=Inline())
-
-
-@pytest.mark.slow
-def test_all_may_work_apart(tmp_path):
-    terms = {"macs": {"transcription": "dfet:2x2"}, "nsga2": {"transcription": "shooting:5", "inner": "propagate"}}
-    each = study(terms=terms, transcriptions=None, inner="auto", runs=1)
-    each.run(tmp_path / "out", executor=Inline())
-    (comparison,) = comparisons(Store.open(tmp_path / "out"), {})
-    assert comparison.transcription == EACH and set(comparison.fronts) == {"macs", "nsga2"}
 
 
 @pytest.mark.slow
@@ -97,14 +80,6 @@ def endless() -> Problem:
 def test_budgets_that_cannot_be(given, message):
     with pytest.raises(ValueError, match=message):
         study(**given)
-
-
-def test_a_solver_may_have_a_transcription_for_each_problem():
-    two = {"slow": glide(), "fast": glide()}
-    own = {"slow": "radau:1x3", "fast": "chebyshev:1x4"}
-    made = study(problems=two, terms={"macs": {"transcription": own, "inner": "none"}})
-    found = {cell.problem: cell.transcription for cell in made.cells if cell.solver == "macs"}
-    assert found == own and all(made.inner_of(cell) == "none" for cell in made.cells if cell.solver == "macs")
 
 
 def test_quick_studies_keep_the_terms():
@@ -196,11 +171,6 @@ def test_each_problem_has_its_own(tmp_path):
     assert both.status(tmp_path / "out").finished == 2
     with pytest.raises(ValueError, match=r"another study: narrow, dfet:2x2, plain: details\.terms"):
         bare(glide(), problems={"plain": glide(), "narrow": narrow(default_inner="ipopt")}).run(tmp_path / "out")
-
-
-def test_the_reentry_is_searched_as_the_case_says():
-    study = Study("reentry", problems="reentry_case1", solvers="macs", runs=1, seed=1)
-    assert (study.inner_of(study.cells[0]), study.sampling_of(study.cells[0])) == ("propagate", Smooth())
 
 
 @pytest.mark.parametrize(

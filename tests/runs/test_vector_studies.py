@@ -168,11 +168,6 @@ def test_options_for_trajectories_are_refused_in_one_line(options, message, tmp_
     assert message in found and found.count("\n") == 1 and not list(tmp_path.iterdir())
 
 
-def test_the_list_has_them(capsys):
-    assert main(["list"]) == 0
-    assert "welded_beam" in capsys.readouterr().out
-
-
 def test_a_study_of_problems_of_pymoo(tmp_path):
     given = [get_problem("zdt1", n_var=3), get_problem("bnh")]
     study = Study("functions", problems=given, solvers=["macs", "nsga2"], evaluations=120, runs=1, seed=1)
