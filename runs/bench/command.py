@@ -19,7 +19,6 @@ from .contract import Bench, Row, save
 from .density import DENSITY
 from .growth import GENERATION, SCALE
 from .inner import INNER, POPULATION
-from .passages import PASSAGES
 from .peers import PEERS
 from .prefer import PREFER
 from .published import METHODS, STANDARD
@@ -33,7 +32,6 @@ BENCHES: dict[str, Bench] = {
     "generation": GENERATION,
     "inner": INNER,
     "methods": METHODS,
-    "passages": PASSAGES,
     "peers": PEERS,
     "population": POPULATION,
     "prefer": PREFER,

@@ -22,7 +22,7 @@ EQUAL, DENSE = "equal", "density"
 
 
 @dataclass(frozen=True)
-class Optimum:
+class MeshCase:
     """An optimum to be found on a mesh: the problem, the word of its transcription, the objective (the first one if empty), and the true
     value where it is known by other means than `published`."""
 
@@ -49,15 +49,15 @@ def word(count: int, steps: int = 1) -> str:
 
 EASY = ("van_der_pol", "climb", "catalyst_mixing", "rayleigh", "batch_reactor", "rocket")
 CASES = (
-    *(Optimum(STANDARD + "hypersensitive", word(count, 7)) for count in (20, 40)),
-    *(Optimum(STANDARD + name, word(count)) for name in EASY for count in (20, 40, 80)),
-    *(Optimum(STANDARD + "robot_arm", word(count)) for count in (20, 40)),
-    *(Optimum("goddard", word(count), "horizontal speed", float(goddard.reference(2)[-1, 1])) for count in (20, 40)),
-    *(Optimum("goddard", word(count), "flight time", goddard.shortest_time()) for count in (20, 40)),
+    *(MeshCase(STANDARD + "hypersensitive", word(count, 7)) for count in (20, 40)),
+    *(MeshCase(STANDARD + name, word(count)) for name in EASY for count in (20, 40, 80)),
+    *(MeshCase(STANDARD + "robot_arm", word(count)) for count in (20, 40)),
+    *(MeshCase("goddard", word(count), "horizontal speed", float(goddard.reference(2)[-1, 1])) for count in (20, 40)),
+    *(MeshCase("goddard", word(count), "flight time", goddard.shortest_time()) for count in (20, 40)),
 )
 
 
-def rounds(case: Optimum, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
+def rounds(case: MeshCase, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
     """A round finds the optimum on equal intervals and, if that converges, from there on those of at most three meshes by the density."""
 
     def measured(number: int) -> Iterable[Row]:
@@ -107,7 +107,7 @@ DENSITY = Bench(
     "follow the density of the trajectory, after at most 3 meshes. Defect: of the simulation at the ends of steps, in units of "
     "what states do. Error: of the objective on the mesh, relative to the true one.",
     full=Effort(CASES),
-    quick=Effort((Optimum(STANDARD + "van_der_pol", word(20)), Optimum(STANDARD + "hypersensitive", word(20, 7)))),
+    quick=Effort((MeshCase(STANDARD + "van_der_pol", word(20)), MeshCase(STANDARD + "hypersensitive", word(20, 7)))),
     prepare=rounds,
     columns=(
         column("defect", "", "defect"),

@@ -30,7 +30,7 @@ from transcription.nlp.derivatives import gradients, hessian
 
 from ..execution.processes import lines_apart
 from ..execution.task import peak_memory
-from .contract import Bench, Effort, Row, Target, column, compiling, rounds_of, short
+from .contract import ASKED, Bench, Effort, Row, Target, column, compiling, rounds_of, short
 
 Work = Callable[[], object]
 
@@ -201,35 +201,44 @@ class Series:
     power: int = 1  # the largest power of the size in it, logarithms left out
 
 
-ELEMENTS, NODES, PHASES = (500, 1000, 2000, 4000), (2500, 5000, 10000, 20000), (5, 10, 20, 40)
-MASSES, SAVED, FLOWN = (25, 50, 100, 200), (250, 500, 1000, 2000), (125, 250, 500, 1000)
-DFET, RADAU, SINGLE, MULTIPLE = "dfet:{}x3", "radau:{}x3", "shooting:{}", "multiple-shooting:{}"
+SIZES = {
+    **dict.fromkeys(("elements", "intervals"), (500, 1000, 2000, 4000)),
+    "nodes": (2500, 5000, 10000, 20000),
+    "phases": (5, 10, 20, 40),
+    "masses": (25, 50, 100, 200),
+    "points": (250, 500, 1000, 2000),
+    "agents": (32, 64, 128, 256),
+}
+WORDS = {"DFET": "dfet:{}x3", "Radau": "radau:{}x3", "single shooting": "shooting:{}", "multiple shooting": "multiple-shooting:{}"}
+UNITS = {"single shooting": "nodes", "multiple shooting": "intervals"}
 SERIES = (
-    Series("set-up, DFET", "elements", partial(setup, DFET), ELEMENTS),
-    Series("set-up, Radau", "elements", partial(setup, RADAU), ELEMENTS),
-    Series("set-up, single shooting", "nodes", partial(setup, SINGLE), NODES),
-    Series("set-up, multiple shooting", "intervals", partial(setup, MULTIPLE), ELEMENTS),
-    Series("candidate, DFET", "elements", partial(candidate, DFET), ELEMENTS),
-    Series("candidate, single shooting", "nodes", partial(candidate, SINGLE), NODES),
-    Series("candidate, multiple shooting", "intervals", partial(candidate, MULTIPLE), ELEMENTS),
-    Series("derivatives, DFET", "elements", partial(derivatives, DFET), ELEMENTS),
-    Series("derivatives, Radau", "elements", partial(derivatives, RADAU), ELEMENTS),
-    Series("derivatives, multiple shooting", "intervals", partial(derivatives, MULTIPLE), ELEMENTS),
-    Series("phases, DFET", "phases", partial(stated, ride, "dfet:4x3"), PHASES),
-    Series("phases, multiple shooting", "phases", partial(stated, ride, "multiple-shooting:10"), PHASES),
-    Series("variables, DFET", "masses", partial(stated, masses, "dfet:10x3"), MASSES),
-    Series("variables, multiple shooting", "masses", partial(stated, masses, "multiple-shooting:20"), MASSES),
-    Series("front saved", "points", saving, SAVED),
-    Series("front loaded", "points", loading, SAVED),
-    Series("front simulated", "points", simulating, FLOWN),
-    Series("search", "agents", searching, (32, 64, 128, 256)),
+    *(
+        Series(f"{kind}, {name}", UNITS.get(name, "elements"), partial(work, word), SIZES[UNITS.get(name, "elements")])
+        for kind, work, names in (
+            ("set-up", setup, tuple(WORDS)),
+            ("candidate", candidate, ("DFET", "single shooting", "multiple shooting")),
+            ("derivatives", derivatives, ("DFET", "Radau", "multiple shooting")),
+        )
+        for name, word in WORDS.items()
+        if name in names
+    ),
+    *(
+        Series(f"{kind}, {name}", unit, partial(stated, build, word), SIZES[unit])
+        for kind, unit, build, words in (
+            ("phases", "phases", ride, {"DFET": "dfet:4x3", "multiple shooting": "multiple-shooting:10"}),
+            ("variables", "masses", masses, {"DFET": "dfet:10x3", "multiple shooting": "multiple-shooting:20"}),
+        )
+        for name, word in words.items()
+    ),
+    Series("front saved", "points", saving, SIZES["points"]),
+    Series("front loaded", "points", loading, SIZES["points"]),
+    Series("front simulated", "points", simulating, (125, 250, 500, 1000)),
+    Series("search", "agents", searching, SIZES["agents"]),
     Series("checkpoint", "agents", checkpointing, (500, 1000, 2000, 4000)),
 )
 """Up to 40 phases and 256 agents: from about 100 phases on, what each picks from the vector of all shows, and from about 300 agents on,
 that each looks at its distances to all others."""
 SHORT = ("set-up, DFET", "candidate, DFET", "derivatives, DFET", "phases, DFET", "variables, DFET", "front saved", "front loaded", "search")
-ASKED_OF_GROWTH = 1.1
-"""Largest exponent of what grows linearly: caches, and what is measured, make some hundredths of it."""
 LEAST_MEMORY = 16.0
 """MB by which a process must have grown between the first and the last of three sizes, for its memory to say anything: blocks of the
 allocator are that large."""
@@ -295,10 +304,10 @@ def scale_targets(rows: Sequence[Row]) -> list[Target]:
     made = []
     for kind in KINDS:
         powers = {row.case: row.of(kind) for row in rows if row.values.get(kind)}
-        large = {case: power for case, power in powers.items() if not power <= ASKED_OF_GROWTH}
+        large = {case: power for case, power in powers.items() if not power <= ASKED["exponent"]}
         worst = large or ({max(powers, key=lambda case: powers[case]): max(powers.values())} if powers else {})
         measured = ", ".join(f"{power:.2f} ({case})" for case, power in worst.items()) or "-"
-        made.append(Target(f"exponents of {kind}", f"at most {ASKED_OF_GROWTH:g} each", measured, not large))
+        made.append(Target(f"exponents of {kind}", f"at most {ASKED['exponent']:g} each", measured, not large))
     unfinished = [row.case for row in rows if row.values.get("unfinished")]
     return [*made, Target("series without an end", "none", ", ".join(unfinished) or "none", not unfinished)]
 
@@ -329,9 +338,6 @@ SCALE = Bench(
 
 
 # A generation of NSGA-III
-
-NOISE = 0.15
-"""What noise may add to the median of exponents."""
 
 
 def flights(build: Callable[[int], Problem], nodes: int | None, population: int | None, size: int) -> Callable[[int], object]:
@@ -396,7 +402,7 @@ def generation_targets(rows: Sequence[Row]) -> list[Target]:
     powers, made = {one.name: one.power for one in GENERATIONS}, []
     for row in rows:
         if row.case in powers:
-            measured, limit = row.of("exponent"), powers[row.case] + NOISE
+            measured, limit = row.of("exponent"), powers[row.case] + ASKED["generation"]
             made.append(Target(row.case, f"a power of at most {limit:g}", short(measured), measured <= limit))
     return made
 

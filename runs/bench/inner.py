@@ -18,7 +18,7 @@ from transcription.base import CONVERGED
 from transcription.inner import InnerResult, InnerSolver, Ipopt, Newton, Projection, Propagate
 from transcription.numerics.batched import compiler
 
-from .contract import Bench, Effort, Row, Target, column, compiling, rounds_of, short, side_by_side
+from .contract import ASKED, Bench, Effort, Row, Target, column, compiling, rounds_of, short, side_by_side
 
 BASELINE, PROJECTION, DEFAULT = "ipopt, constant objective", "ipopt, projection", "projection"
 BATCH = 10
@@ -242,12 +242,10 @@ INNER = Bench(
 
 
 SINGLY, TOGETHER, COMPILED = "one by one", "in one call", "in one call, compiled"
-ASKED_OF_ONE_CALL = 4.0
-"""Times as fast as one by one, without a compiler. Candidates a second would depend on the machine."""
 
 
 @dataclass(frozen=True)
-class Population:
+class PopulationCase:
     """So many candidates of the first re-entry case by a transcription."""
 
     method: str = "shooting:200"
@@ -259,7 +257,7 @@ class Population:
         return f"reentry_case1, {self.method}, {self.candidates} candidates"
 
 
-def population_rounds(case: Population, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
+def population_rounds(case: PopulationCase, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
     """Each round propagates all candidates in each way, five times, of which the quickest counts."""
     problem, method = load("reentry_case1"), parse(case.method)
     X = Smooth().draw(problem, method, case.candidates, np.random.default_rng(0))
@@ -289,16 +287,16 @@ def population_rounds(case: Population, effort: Effort, steps: Steps) -> Callabl
 def population_targets(rows: Sequence[Row]) -> list[Target]:
     """One call is so many times as fast as one by one, by the median of the rounds."""
     speed = next(row for row in rows if row.who == TOGETHER).of("speed")
-    asked = f"at least {ASKED_OF_ONE_CALL:g} times as fast"
-    return [Target("in one call, without a compiler", asked, short(speed), speed >= ASKED_OF_ONE_CALL)]
+    asked = f"at least {ASKED['population']:g} times as fast"
+    return [Target("in one call, without a compiler", asked, short(speed), speed >= ASKED["population"])]
 
 
 POPULATION = Bench(
     title="populations",
     about="POPULATIONS: the candidates of a population search, propagated and scored in one call, against one after the other, in turn; "
     "median, least and greatest of few rounds. Candidates a second depend on the machine and its load.",
-    full=Effort((Population(),), rounds=5),
-    quick=Effort((Population(),), rounds=2),
+    full=Effort((PopulationCase(),), rounds=5),
+    quick=Effort((PopulationCase(),), rounds=2),
     prepare=population_rounds,
     columns=(
         ("times as", "fast", lambda row: "1" if row.who == SINGLY else row.spread("speed")),

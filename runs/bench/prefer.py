@@ -23,12 +23,10 @@ from transcription import parse
 from ..measures.indicators import Points, extent, minimised, truth
 from ..measures.references import union
 from . import functions
-from .contract import SECONDS, Bench, Effort, Row, Target, column, finished, rounds_of
+from .contract import ASKED, SECONDS, Bench, Effort, Row, Target, column, finished, rounds_of
 from .functions import from_pymoo, sphere
 
 GUIDED, EVEN = "guided", "even"
-ASKED_OF_GUIDED = 1 / 3
-"""What is missing of the region's hypervolume, at most, as a multiple of what an even search misses."""
 
 
 @dataclass(frozen=True)
@@ -162,8 +160,8 @@ def rounds(case: GuidedCase, effort: Effort, steps: Steps) -> Callable[[int], It
 
 def targets(rows: Sequence[Row]) -> list[Target]:
     """A guided search misses little of what an even one misses, on each case."""
-    asked = f"missing, guided: at most {ASKED_OF_GUIDED:.2f} of what an even search misses"
-    return [Target(row.case, asked, row.spread("ratio"), row.of("ratio") <= ASKED_OF_GUIDED) for row in rows if row.who == GUIDED]
+    asked = f"missing, guided: at most {ASKED['prefer']:.2f} of what an even search misses"
+    return [Target(row.case, asked, row.spread("ratio"), row.of("ratio") <= ASKED["prefer"]) for row in rows if row.who == GUIDED]
 
 
 PREFER = Bench(

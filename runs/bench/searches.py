@@ -23,7 +23,7 @@ from transcription import Transcription, parse
 from transcription.stopping import stopped_by
 
 from ..measures.indicators import gd, hypervolume, igd
-from .contract import SECONDS, Bench, Column, Effort, Row, Target, column, finished, rounds_of, short
+from .contract import ASKED, SECONDS, Bench, Column, Effort, Row, Target, column, finished, rounds_of, short
 
 POINTS = 10
 """Points of every front."""
@@ -270,8 +270,6 @@ DONE, PROPAGATE, PROJECTION = "until done", "propagate", "projection"
 SWEEP, SWEEPS = "sweep", "sweep, ten starts"
 BUDGETS = (250, 500, 1000, 2000, 4000)
 """Evaluations that another inner level is given, one number after the other until its front is as good."""
-ASKED_OF_INNER = 1.3
-"""Times the time of the better other inner level, at most."""
 
 
 def front_rounds(case: SearchCase, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
@@ -328,8 +326,8 @@ def front_targets(rows: Sequence[Row]) -> list[Target]:
     for case, own in by_case(rows).items():
         others = [own[who].of("ratio") for who in (PROPAGATE, PROJECTION) if own[who].of("good") == 1.0]
         value = f"{short(1 / min(others))} times" if others else "none is as good"
-        asked = f"at most {ASKED_OF_INNER:g} times as long as the better other inner level"
-        made.append(Target(case, asked, value, not others or 1 / min(others) <= ASKED_OF_INNER))
+        asked = f"at most {ASKED['front']:g} times as long as the better other inner level"
+        made.append(Target(case, asked, value, not others or 1 / min(others) <= ASKED["front"]))
     return made
 
 

@@ -16,9 +16,9 @@ import pytest
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems.cases.standard import published
-from runs.bench import BENCHES, density, growth, header_of, inner, passages, peers, prefer, searches, study
+from runs.bench import BENCHES, density, growth, header_of, inner, peers, prefer, searches, study
 from runs.bench import published as optima
-from runs.bench.contract import Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
+from runs.bench.contract import ASKED, Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
 from runs.cli import main
 from transcription import DFET
 
@@ -151,7 +151,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["studies"], ["studies", "study", "constrained, density, front, generation, inner, many, methods, passages, peers, population"]),
+        (["studies"], ["studies", "study", "constrained, density, front, generation, inner, many, methods, peers, population"]),
         (["iner"], ["'iner'", "did you mean inner?"]),
         (["inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
         (["inner", "--seeds", "2"], ["'inner' has none"]),
@@ -209,20 +209,12 @@ def peer_rows(ratio: float, converged: int) -> list[Row]:
     return [ours, Row("isoperimetric", peers.YAPSS, {"seconds": times(1.0), "optimum": [0.0796]})]
 
 
-def alone(kind: str, case: str, who: str, **values: list[float]) -> list[Row]:
-    return [Row(case, who, values)]
-
-
 def search_rows(ratio: float, evaluations: float = 20_000.0) -> list[Row]:
     return [Row("landing_site", searches.OURS, {"ratio": times(ratio), "evaluations": [evaluations]})]
 
 
 def verdict_rows(*kinds: str, memory: float = 100.0) -> list[Row]:
     return [Row("zermelo", who, {"memory": [memory], "published": [1.0]}) for who in kinds]
-
-
-def passage_rows(speed: float, table: float) -> list[Row]:
-    return [Row("passages", who, {"speed": times(value)}) for who, value in ((passages.SINGLY, speed), (passages.TABLE, table))]
 
 
 MET_AND_MISSED = [
@@ -237,9 +229,6 @@ MET_AND_MISSED = [
     ("inner", inner_rows(15.0, 0.07, 0.8), 1),
     ("methods", verdict_rows("agree"), 0),
     ("methods", verdict_rows("DISAGREE"), 1),
-    ("passages", passage_rows(5.0, 200.0), 0),
-    ("passages", passage_rows(4.9, 200.0), 1),
-    ("passages", passage_rows(5.0, 199.0), 1),
     ("peers", peer_rows(1.5, 3), 0),
     ("peers", peer_rows(1.51, 3), 1),
     ("peers", peer_rows(1.0, 2), 1),
@@ -273,14 +262,6 @@ def test_targets_follow_the_medians():
 # Each benchmark
 
 
-def test_passages_side_by_side():
-    rows = measured("passages", passages.Coefficients(few=3, many=30))
-    errors = {row.who: row.of("error") for row in rows}
-    assert max(errors[who] for who in (passages.SINGLY, passages.TOGETHER, passages.TABLE)) < 1e-9
-    assert errors["solve_bvp, 1e-8"] < errors["solve_bvp, 1e-6"] < 1e-6
-    assert "at least 200 times as fast" in BENCHES["passages"].report(rows)
-
-
 @pytest.mark.slow
 def test_inner_levels_side_by_side():
     meshes = {"goddard, cold": DFET(2, 3), "goddard, warm": DFET(2, 3), "orbit_rise, cold, 1e-9": DFET(4, 1), "needle, cold": DFET(8, 3)}
@@ -310,7 +291,7 @@ def test_batches_are_what_the_search_sends():
 
 
 def test_populations_in_one_call_and_one_by_one():
-    rows = measured("population", inner.Population("shooting:130", 4), rounds=2)
+    rows = measured("population", inner.PopulationCase("shooting:130", 4), rounds=2)
     assert [row.who for row in rows] == [inner.SINGLY, inner.TOGETHER] and rows[0].values["speed"] == [1.0, 1.0]
     one, many = (np.array(row.values["candidates"]) for row in rows)
     np.testing.assert_allclose(many / one, rows[1].values["speed"])
@@ -354,12 +335,12 @@ def test_a_guided_search_beside_an_even_one():
     assert (even.who, guided.who) == (prefer.EVEN, prefer.GUIDED) and even.case == guided.case == "zdt1"
     assert even.values["evaluations"] == guided.values["evaluations"] == [3000.0, 3000.0]
     np.testing.assert_allclose(np.array(guided.values["missing"]) / even.values["missing"], guided.values["ratio"])
-    assert max(guided.values["ratio"]) < prefer.ASKED_OF_GUIDED and guided.of("inside") > 4 * even.of("inside")
+    assert max(guided.values["ratio"]) < ASKED["prefer"] and guided.of("inside") > 4 * even.of("inside")
 
 
 @pytest.mark.slow
 def test_intervals_by_density_beside_equal_ones():
-    rows = measured("density", density.Optimum("standard/hypersensitive", density.word(10, 7)))
+    rows = measured("density", density.MeshCase("standard/hypersensitive", density.word(10, 7)))
     equal, dense = rows
     assert equal.case == dense.case == "hypersensitive, multiple-shooting:10x7:linear"
     assert dense.of("defect") < 1e-2 * equal.of("defect") and abs(dense.of("error")) < abs(equal.of("error"))
