@@ -7,7 +7,6 @@ from macs.decisions import dialogue_file
 from macs.fronts import files
 from macs.solvers import checkpoint
 from problems import catalogue
-from runs.batch import file
 from runs.cli import inputs
 from runs.files import DATA_BYTES
 
@@ -32,6 +31,5 @@ def test_the_limits_that_it_names_are_those_of_the_code():
         "checkpoints": checkpoint.LARGEST,
         "tables": DATA_BYTES,
         "files": catalogue.PROBLEM_FILE_BYTES,
-        "preferences": inputs.LARGEST,
+        "preferences": inputs.PREFERENCE_BYTES,
     }
-    assert file.LARGEST == catalogue.PROBLEM_FILE_BYTES

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from macs.io.atomic import read_whole
+from problems.catalogue import PROBLEM_FILE_BYTES
 from problems.checks import unknown
 
 from ..files import check_known, check_trusted, errors_begin_with
 from ..measures.references import reference_addresses
 
 STUDIES = Path(__file__).parents[1] / "studies"
-LARGEST = 2**24
-"""Bytes that a study file may have."""
 
 
 def names() -> list[str]:
@@ -35,7 +34,7 @@ def read(source: str | PathLike[str], keys: Mapping[str, bool], trust: bool) -> 
     path = find(source)
     with errors_begin_with(str(source)):
         try:
-            data = tomllib.loads(read_whole(path, LARGEST).decode())
+            data = tomllib.loads(read_whole(path, PROBLEM_FILE_BYTES).decode())
         except OSError as error:
             raise ValueError(f"cannot be read: {error.strerror or error}") from error
         except UnicodeDecodeError as error:

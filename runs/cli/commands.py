@@ -200,16 +200,17 @@ def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_
     with wrong_call_on_value_error():
         solver = solver_class(name)
         known = inspect.signature(solver).parameters
-        if plain and "refine" not in known:
-            raise WrongCall(f"--no-refine does not apply to solver '{name}', which never uses derivatives")
-        if mesh and "mesh" not in known:
-            raise WrongCall(f"--mesh {mesh} does not apply to solver '{name}', which does not change meshes")
-        if polish_on and "polish_on" not in known:
-            raise WrongCall(f"--polish-on {polish_on} does not apply to solver '{name}', which does not polish")
-        if prefer and "prefer" not in known:
-            raise WrongCall(f"--prefer {prefer} does not apply to solver '{name}', which no preference guides")
-        given = {"refine": False if plain else None, "mesh": mesh, "polish_on": polish_on, "prefer": prefer and read_preference(prefer)}
-        return solver(**{setting: value for setting, value in given.items() if value is not None})
+        options = {
+            "refine": ("--no-refine", plain, "which never uses derivatives"),
+            "mesh": (f"--mesh {mesh}", mesh, "which does not change meshes"),
+            "polish_on": (f"--polish-on {polish_on}", polish_on, "which does not polish"),
+            "prefer": (f"--prefer {prefer}", prefer, "which no preference guides"),
+        }
+        for setting, (option, given, reason) in options.items():
+            if given and setting not in known:
+                raise WrongCall(f"{option} does not apply to solver '{name}', {reason}")
+        values = {"refine": False if plain else None, "mesh": mesh, "polish_on": polish_on, "prefer": prefer and read_preference(prefer)}
+        return solver(**{setting: value for setting, value in values.items() if value is not None})
 
 
 def read_preference(path: str) -> dict[str, Any]:
@@ -315,26 +316,20 @@ def _ends(phase: Any) -> str:
 
 
 def verification_table(front: Front, checks: Sequence[Check]) -> str:
-    """A row for each point, and the reasons of those that fail."""
+    """A row for each point, simulated or of a vector problem evaluated again, and the reasons of those that fail."""
+    columns = {
+        "mismatch": ("trajectory", "stored - decision"),
+        "objectives": ("objectives", "stored - again"),
+        "violation": ("violation", "again"),
+        "defect": ("defect", "simulated"),
+        "simulated": ("violation", "simulated"),
+        "missed": ("objectives", "stored - simulated"),
+    }
     if not front.dynamic:
-        return _evaluation_table(front, checks)
-    values = [(c.mismatch, c.objectives, c.violation, c.defect, c.simulated, c.missed) for c in checks]
-    rows = [[str(c.point), *(f"{v:.1e}" for v in row), "ok" if c.ok else "FAILS"] for c, row in zip(checks, values, strict=True)]
-    headers = [
-        ["#", "trajectory", "objectives", "violation", "defect", "violation", "objectives", ""],
-        ["", "stored - decision", "stored - anew", "anew", "simulated", "simulated", "stored - simulated", ""],
-    ]
-    return _with_reasons(front, text_table(headers, rows, [False] * 7 + [True]), checks)
-
-
-def _evaluation_table(front: Front, checks: Sequence[Check]) -> str:
-    """As `verification_table`, of a vector problem, whose points were evaluated again."""
-    rows = [[str(c.point), *(f"{v:.1e}" for v in (c.objectives, c.missed, c.violation)), "ok" if c.ok else "FAILS"] for c in checks]
-    headers = [["#", "objectives", "objectives", "violation", ""], ["", "stored - again", "in ranges of the front", "again", ""]]
-    return _with_reasons(front, text_table(headers, rows, [False] * 4 + [True]), checks)
-
-
-def _with_reasons(front: Front, table: str, checks: Sequence[Check]) -> str:
+        columns = {name: columns[name] for name in ("objectives", "violation")} | {"missed": ("objectives", "in ranges of the front")}
+    rows = [[str(c.point), *(f"{getattr(c, name):.1e}" for name in columns), "ok" if c.ok else "FAILS"] for c in checks]
+    headers = [["#", *(first for first, _ in columns.values()), ""], ["", *(second for _, second in columns.values()), ""]]
+    table = text_table(headers, rows, [False] * (1 + len(columns)) + [True])
     reasons = [f"point {c.point}: {'; '.join(c.reasons)}" for c in checks if not c.ok]
     return "\n".join([front.table().splitlines()[0], "", table, *([""] if reasons else []), *reasons])
 

@@ -27,7 +27,7 @@ from .answers import WrongCall, wrong_call_on_value_error
 PICTURES = ("png", "pdf", "svg", "eps", "jpg", "jpeg", "ps", "svgz", "tif", "tiff", "webp")
 WORD = re.compile(r"[A-Za-z_][\w./-]*")
 """A value that is text without quotes."""
-LARGEST = 2**20
+PREFERENCE_BYTES = 2**20
 """Bytes that a JSON file of a preference may have."""
 
 
@@ -88,7 +88,7 @@ def _place(error: BaseException, address: str) -> str:
 def read_json(path: str) -> Any:
     """The content of a JSON file. Raises ValueError, in one line, if it cannot be read, is no JSON, or no ordinary file."""
     try:
-        return json.loads(read_whole(path, LARGEST))
+        return json.loads(read_whole(path, PREFERENCE_BYTES))
     except FileNotFoundError:
         raise ValueError(f"there is no file '{path}'") from None
     except OSError as error:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -127,7 +128,7 @@ def test_solve_prints_defects_and_leaves_a_front_and_a_picture(saved):
     assert done.returncode == 0, done.stderr
     front = Front.load(folder / "front.nc")
     assert "defect" in done.stdout and "flight time" in done.stdout and "km/s" in done.stdout
-    rows = [line for line in done.stdout.splitlines() if line.split(" ")[0].isdigit()]
+    rows = [line for line in done.stdout.splitlines() if re.match(r"\d+  ", line)]
     assert len(rows) == len(front) > 0 and all(" verified " in row for row in rows) and front.verified.all()
     assert "front saved in front.nc" in done.stdout and "picture in front.png" in done.stdout
     assert front.stats["seed"] == 1 and front.stats["evaluations"] == 60
