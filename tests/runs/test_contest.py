@@ -206,14 +206,14 @@ def test_searches_that_are_kept_are_not_made_again(tmp_path, monkeypatch, capsys
     with pytest.raises(KeyboardInterrupt):
         ZDT.measure(interrupted, Effort(("ZDT1",), evaluations=200, keep=str(tmp_path), rounds=2))
     assert [row.values["igd"] for row in interrupted] == [row.values["igd"][:1] for row in first]
-    monkeypatch.setattr(contest, "code", lambda: "0" * contest.DIGITS)
+    monkeypatch.setattr(contest, "code", lambda: "0" * 12)
     with pytest.raises(KeyboardInterrupt):
         searched(tmp_path)
     assert f"searches in {folder.name} are of other code" in capsys.readouterr().err
 
 
 def test_a_folder_of_other_things_is_refused(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(contest, "code", lambda: "0" * contest.DIGITS)
+    monkeypatch.setattr(contest, "code", lambda: "0" * 12)
     folder = tmp_path / f"zdt-100-{contest.code()}"
     folder.mkdir()
     (folder / "letter.txt").write_text("dear reader")
