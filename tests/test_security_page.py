@@ -26,7 +26,7 @@ def test_the_limits_that_it_names_are_those_of_the_code():
     (line,) = re.findall(r"Most bytes that are read: (.*?)\.\n", PAGE, re.S)
     found = {name: int(number) * 2 ** {"G": 30, "M": 20}[unit] for name, number, unit in re.findall(r"(\w+)\s+(\d+) ([GM])iB", line)}
     assert found == {
-        "fronts": files.LARGEST,
+        "fronts": files.LARGEST_FRONT,
         "dialogues": dialogue_file.MOST_BYTES,
         "checkpoints": checkpoint.LARGEST,
         "tables": DATA_BYTES,

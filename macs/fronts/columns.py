@@ -6,41 +6,15 @@ import json
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from problems.compiled import Limit, Variable
 
-from ..io.netcdf import Group, Labelled, Labels, words
+from ..io.netcdf import COUNT, NUMBER, TEXT, FileArray, Group, Labelled, words
 
-NUMBER, COUNT, TEXT = "f", "i", "O"
-"""Kinds of an array: float64, whole numbers, str."""
 KINDS = {NUMBER: "numbers", COUNT: "whole numbers", TEXT: "texts"}
-
-
-class FileArray(NamedTuple):
-    """One array of a file."""
-
-    dimensions: tuple[str, ...]
-    kind: str
-    long_name: str
-    units: str = "1"
-    optional: bool = False  # whether files need not have it
-
-    def of(self, values: Any) -> np.ndarray:
-        """Values as an array of this kind, with NaN for None."""
-        if self.kind == TEXT:
-            return words(values)
-        if self.kind == COUNT:
-            return np.asarray(values, dtype=np.int32)
-        return np.array([np.nan if value is None else value for value in values], dtype=float)
-
-
-def labelled(table: Mapping[str, FileArray], values: Mapping[str, np.ndarray], attrs: dict[str, Any]) -> Labelled:
-    """Arrays of a table with their labels."""
-    labels = {name: Labels(table[name].dimensions, table[name].long_name, table[name].units) for name in values}
-    return Labelled(values, labels, attrs)
 
 
 def checked(table: Mapping[str, FileArray], group: Group) -> Labelled:
@@ -53,7 +27,7 @@ def checked(table: Mapping[str, FileArray], group: Group) -> Labelled:
             raise ValueError(f"'{name}' is missing from it")
         if name in group.arrays and group.arrays[name].dtype.kind != column.kind:
             raise ValueError(f"'{name}' has {KINDS[group.arrays[name].dtype.kind]}, not {KINDS[column.kind]}")
-    return labelled(table, group.arrays, group.attrs)
+    return Labelled(group.arrays, table, group.attrs)
 
 
 def legal_names(names: Iterable[str], kind: str, taken: Iterable[str]) -> dict[str, str]:

@@ -25,16 +25,11 @@ from transcription.numerics.polynomials import BASES
 from transcription.trajectories.costates import Costates, PhaseCostates
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
-from ..io.netcdf import Group, Labelled, words
+from ..io.netcdf import COUNT, NUMBER, TEXT, FileArray, Group, Labelled, words
 from ..io.text import document
 from .columns import (
-    COUNT,
-    NUMBER,
-    TEXT,
-    FileArray,
     checked,
     distinct,
-    labelled,
     legal_names,
     named_columns,
     named_table,
@@ -270,7 +265,7 @@ def write_phase(name: str, phases: Sequence[PhaseTrajectory | None], costates: S
         arrays |= COSTATES.write(_each(costates, "polynomial"), len(names["state"]))
         arrays["costate_error"] = layout.table["costate_error"].of(_each(costates, "error"))
         attrs["costates"] = MEANING
-    return labelled(layout.table, arrays, attrs)
+    return Labelled(arrays, layout.table, attrs)
 
 
 def read_phase(name: str, group: Group, points: int) -> tuple[list[PhaseTrajectory | None], list[PhaseCostates | None]]:
@@ -373,7 +368,7 @@ def root_dataset(front: Points) -> Labelled:
         none = np.full(len(front.goals), np.nan)
         arrays["weights"] = np.array([none if one is None else one.weights for one in front.costates])
     arrays |= {column.array: column.stored.of(getattr(front, name)) for name, column in COLUMNS.items() if column.stored}
-    return labelled(ROOT, {name: arrays[name] for name in ROOT if name in arrays}, _attributes(front))
+    return Labelled(arrays, ROOT, _attributes(front))
 
 
 def phase_names(front: Points) -> list[str]:

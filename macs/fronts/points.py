@@ -13,8 +13,8 @@ from problems.vector import without_dynamics
 from transcription.trajectories.costates import Costates
 from transcription.trajectories.trajectory import Trajectory
 
+from ..io.netcdf import COUNT, NUMBER, TEXT, FileArray
 from ..io.text import counted
-from .columns import COUNT, NUMBER, TEXT, FileArray
 from .point import Point, number
 from .provenance import STATS, AnyCompiled, ProblemSource, versions
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -141,27 +142,22 @@ def _mismatch(point: Point, nlp: NLP) -> tuple[float, str]:
     return differences[where], where
 
 
+PARTS = {
+    "times": ("time", "state.edges", "control.edges"),
+    "states": ("states", "state.coefficients"),
+    "controls": ("controls", "control.coefficients"),
+    "path constraints": ("paths",),
+}
+"""Arrays of a phase that belong together."""
+
+
 def _phase_differences(one: PhaseTrajectory, two: PhaseTrajectory) -> dict[str, float]:
     span = [max(abs(two.t0), abs(two.tf), two.tf - two.t0) or 1.0]  # a phase without duration may lie at 0
-    states, controls = two.state_variables, two.control_variables
+    scales = dict(zip(PARTS, (span, two.state_variables, two.control_variables, two.path_limits), strict=True))
+    arrays = {part: [(attrgetter(name)(one), attrgetter(name)(two)) for name in names] for part, names in PARTS.items()}
+    found = {part: max(_difference(*pair, scales[part]) for pair in pairs) for part, pairs in arrays.items()}
     same_bases = (one.state.basis, one.control.basis) == (two.state.basis, two.control.basis)
-    return {
-        "times": max(
-            _difference(one.time[:, None], two.time[:, None], span),
-            _difference(one.state.edges[:, None], two.state.edges[:, None], span),
-            _difference(one.control.edges[:, None], two.control.edges[:, None], span),
-        ),
-        "states": max(
-            _difference(one.states, two.states, states),
-            _difference(one.state.coefficients, two.state.coefficients, states),
-        ),
-        "controls": max(
-            _difference(one.controls, two.controls, controls),
-            _difference(one.control.coefficients, two.control.coefficients, controls),
-        ),
-        "path constraints": _difference(one.paths, two.paths, two.path_limits),
-        "bases": 0.0 if same_bases else np.inf,
-    }
+    return {**found, "bases": 0.0 if same_bases else np.inf}
 
 
 def _difference(one: Any, two: Any, scales: Sequence[Any]) -> float:

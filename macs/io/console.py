@@ -129,20 +129,16 @@ class StatusLine(Display):
         """The present words with a spinner."""
         from rich.spinner import Spinner
 
-        return Spinner("dots", self._words)
+        return Spinner("dots", self.line())
 
 
-class Steps(Display):
+class Steps(StatusLine):
     """Display of a known number of steps. Ctrl-C raises `Stopped` at the next step; a second Ctrl-C interrupts at once."""
-
-    transient = True
 
     def __init__(self, title: str, total: int, stream: TextIO | None = None, at_once: bool = False) -> None:
         super().__init__(True, stream)
-        self._at_once = at_once
+        self._at_once, self._interrupts = at_once, Interrupts()
         self._title, self._total, self._done = title, total, 0
-        self._what = ""
-        self._interrupts = Interrupts()
 
     def __enter__(self) -> Self:
         if not self._at_once:
@@ -157,24 +153,11 @@ class Steps(Display):
         """Begin the next step, described by `what`. Raises `Stopped` if Ctrl-C was pressed."""
         self.check()
         self._done += 1
-        self._what = what
-        self.refresh()
+        self(f"{self._title}: {what}, step {self._done} of {self._total}")
 
     def line(self) -> str:
         """The present step, its number and the elapsed time."""
-        return f"{self._title}: {self._what}, step {self._done} of {self._total}, {minutes(self.elapsed)}"
-
-    def render(self) -> Any:
-        """The present step with a bar."""
-        from rich.progress_bar import ProgressBar
-        from rich.table import Table
-        from rich.text import Text
-
-        row = Table.grid(padding=(0, 2), expand=False)
-        finished = max(self._done - 1, 0)
-        bar = ProgressBar(total=self._total, completed=finished, width=30)
-        row.add_row(Text(f"{self._title}: {self._what}"), bar, Text(f"{finished}/{self._total}"), Text(minutes(self.elapsed), style="dim"))
-        return row
+        return f"{super().line()}, {minutes(self.elapsed)}"
 
     def asked(self) -> bool:
         """Whether Ctrl-C was pressed, for `transcription.stopping`."""

@@ -19,6 +19,8 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray
 
+NUMBER, COUNT, TEXT = "f", "i", "O"
+"""Kinds of an array: float64, whole numbers, str."""
 NUMBERS = ("float64", "int8", "int32", "int64")
 """Types of the numbers that are read."""
 DEPTH = 3
@@ -33,12 +35,22 @@ DIMENSION_ONLY = b"This is a netCDF dimension but not a netCDF variable"
 """What netCDF-4 calls a dimension without labels."""
 
 
-class Labels(NamedTuple):
-    """What an array is: the names of its dimensions, and a name and a unit for its reader."""
+class FileArray(NamedTuple):
+    """What an array of a file is."""
 
     dimensions: tuple[str, ...]
+    kind: str  # NUMBER, COUNT or TEXT
     long_name: str
     units: str = "1"
+    optional: bool = False  # whether files need not have it
+
+    def of(self, values: Any) -> np.ndarray:
+        """Values as an array of this kind, with NaN for None."""
+        if self.kind == TEXT:
+            return words(values)
+        if self.kind == COUNT:
+            return np.asarray(values, dtype=np.int32)
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +59,13 @@ class Labelled:
     to import."""
 
     arrays: Mapping[str, np.ndarray]  # of numbers, or of str as objects. Labels of a dimension are the array of its name.
-    labels: Mapping[str, Labels]  # of each array
+    table: Mapping[str, FileArray]  # of these arrays, and maybe of others
     attrs: dict[str, Any] = field(default_factory=dict)  # texts, numbers and arrays of numbers
 
     def __post_init__(self) -> None:
         lengths: dict[str, int] = {}
         for name, values in self.arrays.items():
-            dimensions = self.labels[name].dimensions
+            dimensions = self.table[name].dimensions
             if values.ndim != len(dimensions):
                 raise ValueError(f"'{name}' has {values.ndim} dimensions, not {len(dimensions)} ({', '.join(dimensions)})")
             for dimension, length in zip(dimensions, values.shape, strict=True):
@@ -66,7 +78,7 @@ class Labelled:
         return {
             dimension: length
             for name, values in self.arrays.items()
-            for dimension, length in zip(self.labels[name].dimensions, values.shape, strict=True)
+            for dimension, length in zip(self.table[name].dimensions, values.shape, strict=True)
         }
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -76,10 +88,9 @@ class Labelled:
         """The same as a Dataset of xarray."""
         import xarray
 
-        variables = {
-            name: (list(labels.dimensions), self.arrays[name], {"long_name": labels.long_name, "units": labels.units})
-            for name, labels in self.labels.items()
-        }
+        about = {name: self.table[name] for name in self.arrays}
+        labels = {name: {"long_name": one.long_name, "units": one.units} for name, one in about.items()}
+        variables = {name: (list(one.dimensions), self.arrays[name], labels[name]) for name, one in about.items()}
         return xarray.Dataset(variables, attrs=self.attrs)
 
 
@@ -119,8 +130,8 @@ def _write_group(group: Any, data: Labelled, ids: Iterator[int]) -> None:
         if name not in data.arrays:
             scales[name] = group.create_dataset(name, (size,), ">f4", maxshape=None if size else (None,), track_order=True)
             scales[name].make_scale(DIMENSION_ONLY + b".%10d" % size)
-    for name, labels in data.labels.items():
-        values = data[name]
+    for name, values in data.arrays.items():
+        labels = data.table[name]
         if name in sizes and labels.dimensions != (name,):
             raise ValueError(f"'{name}' is a dimension, and an array of others")
         dtype = string_dtype() if values.dtype.kind == "O" else values.dtype
@@ -132,8 +143,8 @@ def _write_group(group: Any, data: Labelled, ids: Iterator[int]) -> None:
             scales[name].make_scale(name)
     for name, scale in scales.items():
         scale.attrs["_Netcdf4Dimid"] = np.int32(numbers[name])
-    for name, labels in data.labels.items():
-        array = arrays[name]
+    for name, array in arrays.items():
+        labels = data.table[name]
         if labels.dimensions:
             array.attrs["_Netcdf4Coordinates"] = np.array([numbers[one] for one in labels.dimensions], dtype=np.int32)
         if name not in sizes:

@@ -205,14 +205,14 @@ def _worth(phase: PhaseTrajectory, costates: PhaseCostates) -> float:
     return float(np.abs(costates.at_nodes).max(axis=0, initial=0.0) @ np.ptp(phase.states, axis=0))
 
 
+QUANTITIES = {"state": "state_variables", "control": "control_variables", "path": "path_limits"}
+"""Kinds of quantities, and the attribute of a phase that has all of a kind."""
+
+
 def quantities(trajectory: Trajectory) -> list[tuple[str, str]]:
     """Names of all states, then controls, then path constraints, each once, with their kind: "state", "control" or "path"."""
-    kinds = {
-        "state": [v.name for phase in trajectory.phases for v in phase.state_variables],
-        "control": [v.name for phase in trajectory.phases for v in phase.control_variables],
-        "path": [limit.name for phase in trajectory.phases for limit in phase.path_limits],
-    }
-    return [(name, kind) for kind, names in kinds.items() for name in dict.fromkeys(names)]
+    found = [(one.name, kind) for kind, those in QUANTITIES.items() for phase in trajectory.phases for one in getattr(phase, those)]
+    return list(dict.fromkeys(found))
 
 
 def along(phase: PhaseTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -231,22 +231,15 @@ def draw_panel(ax: Any, drawn: Sequence[Drawn], name: str, kind: str) -> None:
     owners: list[Variable | Limit] = []
     for one in drawn:
         for k, phase in enumerate(one.trajectory.phases):
-            lists: dict[str, Sequence[Variable | Limit]] = {
-                "state": phase.state_variables,
-                "control": phase.control_variables,
-                "path": phase.path_limits,
-            }
-            owner = next((owner for owner in lists[kind] if owner.name == name), None)
+            owner = next((owner for owner in getattr(phase, QUANTITIES[kind]) if owner.name == name), None)
             if owner is None:
                 continue
             color = one.color or COLORS[k % len(COLORS)]
             nodes, (times, line) = phase[name], along(phase, name)
             ax.plot(times, line, color=color, lw=0.9 if kind == "path" and not one.color else 1.3)
             values += [line[np.isfinite(line)], nodes]
-            if not one.color:
+            if one.hollow or not one.color:
                 _dots(ax, phase.time, nodes, color, one.hollow)
-            elif one.hollow:
-                _dots(ax, phase.time, nodes, color, hollow=True)
             if one.color and phase is not one.trajectory.phases[-1]:
                 ax.plot(phase.time[-1:], nodes[-1:], "o", color=color, ms=4.0)
             held.setdefault((owner.lower, owner.upper), []).append(phase)

@@ -23,8 +23,8 @@ def by_h5netcdf(groups: dict[str, netcdf.Labelled]) -> bytes:
         for path, data in groups.items():
             group = file.create_group(path) if path else file
             group.dimensions = data.sizes
-            for name, labels in data.labels.items():
-                values = data[name]
+            for name in data.arrays:
+                values, labels = data[name], data.table[name]
                 dtype = h5py.string_dtype() if values.dtype.kind == "O" else values.dtype
                 variable = group.create_variable(name, labels.dimensions, dtype=dtype, data=values)
                 variable.attrs["long_name"], variable.attrs["units"] = labels.long_name, labels.units
@@ -77,6 +77,6 @@ def test_a_file_has_what_h5netcdf_writes(name: str) -> None:
 
 
 def test_a_dimension_has_no_other_array_of_its_name() -> None:
-    labels = {"a": netcdf.Labels(("b",), "an array"), "b": netcdf.Labels(("a",), "another")}
+    labels = {"a": netcdf.FileArray(("b",), "f", "an array"), "b": netcdf.FileArray(("a",), "f", "another")}
     with pytest.raises(ValueError, match="'a' is a dimension, and an array of others"):
         netcdf.to_bytes({"": netcdf.Labelled({"a": np.zeros(2), "b": np.zeros(3)}, labels)})

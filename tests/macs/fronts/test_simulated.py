@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from macs import NSGA2, Front
-from macs.fronts.builders import from_vectors
 from problems import Problem
-from transcription import DFET, SingleShooting
+from transcription import SingleShooting
 
 
 def push(mass: float = 2.0, unit: str = "m", drag: float = 0.0, most: float = 2.0, end: float = 4.0, start: float = 0.0, **more) -> Problem:
@@ -69,16 +68,6 @@ def test_points_that_become_infeasible_have_this_status_and_do_not_merge(front):
     assert (front.simulate(push(gate=limit), tolerance=100.0).status == "converged").all()
 
 
-def test_what_is_dominated_in_the_air_is_not_the_best():
-    """Objectives on a coarse mesh that simulation does not confirm."""
-    front = NSGA2(population=8).solve(push(drag=2.0), DFET(1, 1), evaluations=64, seed=3, inner="propagate")
-    again = front.simulate(tolerance=1.0)
-    merged = Front.merge([again])
-    kept = [k for k, one in enumerate(again.F) if not ((one >= again.F).all(axis=1) & (one > again.F).any(axis=1)).any()]
-    np.testing.assert_array_equal(again.F[kept], merged.F)
-    assert (np.abs(again.F - front.F).max() > 1e-3) and len(kept) <= len(front)
-
-
 def test_other_data_make_nothing_verified(front):
     """What a simulation of the front's own problem found is not true of another."""
     assert front.verified.all() and front.was_simulated.all()
@@ -130,12 +119,3 @@ def test_what_was_decided_has_to_be_within_the_other_bounds(front, data, what, a
     for point in other:
         thrust = point.trajectory["run"].control.coefficients
         assert point.violations[what] == pytest.approx((thrust.max() - 0.01) / 0.01 if amount is None else amount)
-
-
-def test_controls_that_leave_their_bounds_between_nodes_are_seen():
-    """Values 2, 2, 1 at the three nodes of an element, of at most 2: the parabola through them is 2.125 between the first two."""
-    nlp = DFET(1, 2).transcribe(push())
-    Z = nlp.propagate(nlp.first_guess(np.array([[2.0, 2.0, 1.0]])))
-    some = {"status": ["converged"], "optimality": [None]}
-    front = Front.of(from_vectors(nlp, Z, {"name": "by hand"}, {"tolerance": 1e-6}, **some))
-    assert front.simulate(tolerance=1.0)[0].violations["bounds of run.u"] == pytest.approx(0.125 / 2.0, rel=1e-2)

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -44,22 +42,6 @@ def test_an_honest_front_verifies(front, tmp_path):
     assert verify(Front.load(tmp_path / "front.nc"), tolerance=1.0) == checks
 
 
-@pytest.mark.slow
-def test_simulations_are_compared_to_the_tolerance(front):
-    """A point fails where it ends farther away than the tolerance, and none does below the least that any is away."""
-    away = [check.defect for check in verify(front, tolerance=1.0)]
-    assert 0.0 < min(away) < max(away)
-    checks = verify(front, tolerance=0.5 * min(away))
-    assert not any(check.ok for check in checks) and all("simulated, it ends" in check.reasons[0] for check in checks)
-    between = verify(front, tolerance=0.5 * max(away))
-    assert [any("simulated, it ends" in reason for reason in check.reasons) for check in between] == [one > 0.5 * max(away) for one in away]
-
-
-def test_objectives_that_were_touched_up_are_found(front):
-    checks = verify(altered(front, F=front.F - [[0.5, 0.0]]), tolerance=1.0)
-    assert all(check.reasons == (f"stored objectives differ from recomputed ones by {check.objectives:.1e}",) for check in checks)
-
-
 def test_decisions_that_were_touched_up_are_found(front):
     decision = np.array(front.decision)
     decision[:, 3] += 0.25 * np.array([v.span for v in front.variables])[3]
@@ -73,15 +55,6 @@ def test_trajectories_of_other_points_are_found(front):
     checks = verify(altered(front, trajectories=swapped), tolerance=1.0)
     assert any("phase 'ascent'" in reason for check in checks for reason in check.reasons)
     assert all("stored phases" in check.reasons[0] for check in verify(altered(front, trajectories=None), tolerance=1.0))
-
-
-def test_one_state_at_one_node_is_enough(front):
-    flight = front[0].trajectory
-    states = flight["ascent"].states.copy()
-    states[5, 2] += 1e-4
-    phase = dataclasses.replace(flight["ascent"], states=states)
-    checks = verify(altered(front[:1], trajectories=[dataclasses.replace(flight, phases=(phase,))]), tolerance=1.0)
-    assert checks[0].reasons == ("stored states of phase 'ascent' differ from the decision vector by 8.3e-06",)
 
 
 def test_what_cannot_be_verified_says_why(front):
@@ -109,13 +82,7 @@ def test_objectives_that_only_the_mesh_believes_are_found():
     assert any(not check.ok and "objectives differ" in " ".join(check.reasons) for check in checks)
 
 
-@pytest.mark.slow
-def test_statuses_and_violations_that_were_touched_up_are_found(front):
-    assert all(not check.ok for check in verify(altered(front, violation=np.full(len(front), 123.0)), tolerance=1))
-    assert all(not check.ok for check in verify(altered(front, status=np.full(len(front), "failed")), tolerance=1))
-
-
-@pytest.mark.parametrize("scheme", ["dfet:2x2", "radau:3x2", "shooting:5"])
+@pytest.mark.parametrize("scheme", ["dfet:2x2", "shooting:5"])
 @pytest.mark.filterwarnings("error")
 def test_a_phase_without_duration_verifies(tmp_path, scheme):
     """The trajectory whose phase begins and ends at 0 is its own simulation."""

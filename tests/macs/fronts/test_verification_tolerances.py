@@ -22,7 +22,7 @@ from transcription.trajectories.simulate import simulate_all
 # What a simulation finds, against what is known
 
 
-@pytest.mark.parametrize(("share", "good"), [(1.05, True), (0.95, False), (0.4, False)])
+@pytest.mark.parametrize(("share", "good"), [(1.05, True), (0.95, False)])
 def test_what_only_the_simulated_trajectory_violates_is_found(share, good):
     """The control, of values 2, 2 and 1 at Gauss points, is a parabola that exceeds its bound 2 between the first two by an eighth: by a
     sixteenth of the span of the bounds. The point is feasible at its nodes, and its states and objectives are exact."""
@@ -33,7 +33,7 @@ def test_what_only_the_simulated_trajectory_violates_is_found(share, good):
     assert check.ok is good and check.reasons == (() if good else (said,))
 
 
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False), (2.9, False)])
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
 def test_an_end_that_a_simulation_does_not_reach_is_compared_to_the_tolerance(share, good):
     """After two seconds x, within [-5, 5], is 0.01 times `share` less than stored."""
     (check,) = verify(slowed(points(cart(of_objective=1e6), [1.0] * 4), 5e-3 * share), tolerance=1e-3)
@@ -42,7 +42,7 @@ def test_an_end_that_a_simulation_does_not_reach_is_compared_to_the_tolerance(sh
     assert check.reasons[1:] == (() if good else (f"simulated, it ends {check.defect:.1e} away (tolerance 1.0e-03)",))
 
 
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False), (2.9, False)])
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
 def test_objectives_that_a_simulation_does_not_give_are_compared_to_the_tolerance(share, good):
     """The effort 2 u^2, of scale 0.1, changes by 40 times a small part of u: so the end, of span 10, by far less than the tolerance."""
     (check,) = verify(slowed(points(cart(of_objective=0.1), [1.0] * 4), share * 1e-3 / 40.0), tolerance=1e-3)
@@ -214,7 +214,7 @@ def test_honest_rows_pass():
     assert all((c.mismatch, c.violation, c.objectives, c.defect, c.simulated, c.missed) == (0.0,) * 6 for c in checks)
 
 
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False), (2.9, False)])
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
 def test_objectives_of_rows_are_compared_in_the_range_of_the_front(share, good):
     """Those of (0, 0) and (1, 0) are 0 and 1, and 4 and 1: ranges of 1 and 3."""
     front = rows([[0.0, 0.0], [1.0, 0.0]])
@@ -224,7 +224,7 @@ def test_objectives_of_rows_are_compared_in_the_range_of_the_front(share, good):
     assert first.reasons == (() if good else (f"evaluated again, its objectives differ by {first.missed:.1e} (tolerance 1.0e-03)",))
 
 
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False), (2.9, False)])
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
 @pytest.mark.parametrize(("tolerance", "allowed"), [(1e-3, 1e-3), (1e-9, 1e-6)])
 def test_rows_may_violate_what_is_asked_for_or_what_the_search_allowed(share, good, tolerance, allowed):
     """The wall is at 1.5, and its scale is 1.5 or 1: the share is of what the problem says of a row behind it."""
@@ -269,7 +269,7 @@ def test_rows_that_fail_or_are_of_another_problem_are_told():
         verify(rows([[1.0, 0.0]], variables=others), tolerance=1e-3)
 
 
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False), (2.9, False)])
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
 def test_rows_are_marked_by_the_same_tolerances(share, good):
     """Of the range 1 of the first objective, or of the scale of the wall; the note says so."""
     front, scale = rows([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), (parabolas().compile().limits or ())[0].scale

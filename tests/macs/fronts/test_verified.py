@@ -15,7 +15,6 @@ from macs.fronts.verified import VERIFY, Simulations, accuracy, largest_miss, ob
 from problems import Problem
 from problems.compiled import Limit, Variable, verified_scale
 from transcription import DFET, SingleShooting
-from transcription.stopping import Stopped
 
 
 def test_what_agrees_is_verified():
@@ -141,17 +140,6 @@ def test_an_error_that_grows_by_itself_is_called_unstable():
     assert fine.status == coarse.status == "converged" and fine.verified is coarse.verified is False
     assert "the dynamics are unstable, and no simulation without feedback can follow them" in fine.note
     assert "its states differ by" in coarse.note and "unstable" not in coarse.note
-
-
-def test_a_time_limit_while_a_remark_is_sought_leaves_the_remark_out(monkeypatch):
-    def stopped(*arguments, **more):
-        raise Stopped("time limit")
-
-    front = points(cart(), *constant(0.5))
-    off = slowed(front, 0.2)
-    monkeypatch.setattr(module, "simulate_elements", stopped)
-    (note,) = verified(off, 1e-3).notes
-    assert "its states differ by" in note and "unstable" not in note
 
 
 def test_an_error_of_one_element_in_the_middle_is_not_called_unstable():
