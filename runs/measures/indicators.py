@@ -24,7 +24,7 @@ from macs.io.text import counted, label
 from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
 
-CORNER = 1.1
+VOLUME_CORNER = 1.1
 """Of the hypervolume in each objective, in ranges of the reference from its ideal: as published comparisons have it."""
 CURVE_SAMPLES = 2001
 """Number of points, evenly along its length, that represent a dense reference of two objectives."""
@@ -122,7 +122,7 @@ def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True
 
 
 @_documented
-def hypervolume(front: Points, reference: Points, *, point: float = CORNER, normalise: bool = True) -> float:
+def hypervolume(front: Points, reference: Points, *, point: float = VOLUME_CORNER, normalise: bool = True) -> float:
     """Volume that the front dominates, up to `point` in each objective, in which the reference reaches from 0 to 1. 0 if it is empty.
 
     With `normalise=False` the volume is in the objectives' own units, and `point` is how far beyond the reference's nadir it goes, 1.1 for
@@ -278,14 +278,14 @@ class Scale:
         goals = goals or [Objective(f"objective {i + 1}") for i in range(R.shape[1])]
         ideal, unit = extent(R)
         sign = np.array([goal.sign for goal in goals])
-        best, worst, corner = (tuple((sign * values + 0.0).tolist()) for values in (ideal, R.max(axis=0), ideal + CORNER * unit))
+        best, worst, corner = (tuple((sign * values + 0.0).tolist()) for values in (ideal, R.max(axis=0), ideal + VOLUME_CORNER * unit))
         return cls(best, worst, corner, tuple(goals), what, len(R), curve and bool(pieces(R)))
 
     def describe(self) -> str:
         """Two sentences for a caption."""
         how = ", the curve through them" if self.curve else ""
         ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
-        volume = f"Hypervolume up to {CORNER:g} in each objective ({self._all(self.corner)})."
+        volume = f"Hypervolume up to {VOLUME_CORNER:g} in each objective ({self._all(self.corner)})."
         return f"Objectives normalised to {ends} of {self.what} ({counted(self.count, 'point')}{how}). {volume}"
 
     def _all(self, values: tuple[float, ...]) -> str:

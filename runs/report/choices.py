@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -76,10 +76,11 @@ def choices_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str
     every = chosen(comparison)
     if not every:
         return {}
-    goals = every[0].point.goals
+    goals, first = every[0].point.goals, {one.solver: one for one in reversed(every)}
+    verified = {True: "yes", False: "no", None: "-"}
     heads: list[Head | str] = [Head("solver", grouped=True), "choice", *_objectives(goals), *_degrees(goals), "verified"]
-    rows = [[one.solver, one.label, *one.objectives.tolist(), *_numbers(one.degrees()), _verified(one.point)] for one in every]
-    notes = ["Degrees are those of the preference that chose. " + _measures(every)]
+    rows = [[one.solver, one.label, *one.objectives.tolist(), *_numbers(one.degrees()), verified[one.point.verified]] for one in every]
+    notes = ["Degrees are those of the preference that chose. " + " ".join(map(_ranges, reversed(first.values())))]
     notes += [f"{one.solver}, {one.label}: {one.message}." for one in every if one.message]
     found = {"choices": table(heads, rows, f"{comparison.name}: what was chosen.", notes)}
     steps = [(one, step) for one in every if len(one.steps) > 1 for step in one.steps]
@@ -87,22 +88,18 @@ def choices_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str
         about = list(dict.fromkeys(name for _, step in steps for name in step["about"]))
         heads = [Head("solver", grouped=True), Head("choice", grouped=True), "step", *(Head(name, digits=4) for name in about)]
         heads += [Head("value", digits=5), *_objectives(goals), *_degrees(goals), "status"]
-        found["steps"] = table(
-            heads,
+        rows = [
             [
-                [
-                    *(one.solver, one.label, step["name"]),
-                    *(step["about"].get(name) for name in about),
-                    step["value"],
-                    *(step["objectives"][goal.name] for goal in goals),
-                    *_numbers(np.array([step["degrees"][goal.name] for goal in goals])),
-                    step["status"],
-                ]
-                for one, step in steps
-            ],
-            f"{comparison.name}: steps of the choices that took several.",
-            ["Objectives are what the solve of a step found; kappa is that of the best point known by then, which may be another."],
-        )
+                *(one.solver, one.label, step["name"]),
+                *(step["about"].get(name) for name in about),
+                *(step["value"], *(step["objectives"][goal.name] for goal in goals)),
+                *_numbers(step["degrees"][goal.name] for goal in goals),
+                step["status"],
+            ]
+            for one, step in steps
+        ]
+        note = "Objectives are what the solve of a step found; kappa is that of the best point known by then, which may be another."
+        found["steps"] = table(heads, rows, f"{comparison.name}: steps of the choices that took several.", [note])
     return found
 
 
@@ -112,7 +109,7 @@ def choices_figures(comparison: Comparison) -> dict[str, Figure]:
     for solver in dict.fromkeys(one.solver for one in every):
         mine = [one for one in every if one.solver == solver]
         found |= {f"lambda-{solver}-{k}": figure for k, figure in enumerate(lambda_figures(mine), 1)}
-        for number, part in enumerate(_parts(mine), 1):
+        for number, part in enumerate((mine[k : k + SIDE_BY_SIDE] for k in range(0, len(mine), SIDE_BY_SIDE)), 1):
             stem = solver if len(mine) <= SIDE_BY_SIDE else f"{solver}-{number}"
             found[f"degrees-{stem}"] = degrees_figure(part)
             if all(one.point.trajectory is not None for one in part):
@@ -125,10 +122,9 @@ def lambda_figures(every: Sequence[RunChoice]) -> list[Figure]:
     by_order: dict[Any, dict[float, np.ndarray]] = {}
     for one in every:
         if isinstance(one.preference, FuzzySatisfactory) and not one.preference.ordered:
-            goals, preference = one.point.goals, one.preference
-            kappa = preference.kappa(goals, one.ranges, one.objectives[None])
-            line = by_order.setdefault(preference.priorities, {})
-            line.setdefault(preference.regulating, np.concatenate([one.degrees(), kappa]))
+            kappa = one.preference.kappa(one.point.goals, one.ranges, one.objectives[None])
+            line = by_order.setdefault(one.preference.priorities, {})
+            line.setdefault(one.preference.regulating, np.concatenate([one.degrees(), kappa]))
     found = []
     for priorities, values in by_order.items():
         if len(values) < 3:
@@ -137,31 +133,27 @@ def lambda_figures(every: Sequence[RunChoice]) -> list[Figure]:
         with style():
             figure = new_figure(COLUMN, 2.7)
             ax = figure.subplots()
-            names = [*(goal.name for goal in goals), "kappa"]
+            names = [*(goal.name for goal in every[0].point.goals), "kappa"]
             for k, (name, line) in enumerate(zip(names, np.array([values[weight] for weight in weights]).T, strict=True)):
                 ax.plot(weights, line, "o-", ms=3, lw=1.2, color=COLORS[k % len(COLORS)], label=name)
             ax.axhline(0.0, color="black", lw=0.6)
             ax.set(xlabel="lambda", ylabel="membership, kappa")
-            legend(figure, ax, None, f"first {' and '.join(priorities[0])}")
+            legend(figure, ax, f"first {' and '.join(priorities[0])}")
         found.append(figure)
     return found
 
 
-def degrees_figure(every: Sequence[RunChoice], by: Preference | None = None) -> Figure:
-    """Degrees of some choices as bars beside each other, by the preference of the first unless another is given."""
-    by, goals = by or every[0].preference, every[0].point.goals
+def degrees_figure(every: Sequence[RunChoice]) -> Figure:
+    """Degrees of some choices as bars beside each other, by the preference of the first."""
+    by, goals = every[0].preference, every[0].point.goals
     with style():
         figure = new_figure(PAGE, 3.0)
         degrees = {one.label: one.degrees(by, every[0].ranges) for one in every}
         ax = draw_degrees(degrees, [goal.name for goal in goals], by.DEGREE, by.MARKS, by.SMALLER, ax=figure.subplots())
         if (beside := ax.get_legend()) is not None:
             beside.remove()  # its columns do not know how long names are
-        legend(figure, ax, None)
+        legend(figure, ax)
     return figure
-
-
-def _parts(every: Sequence[RunChoice]) -> list[Sequence[RunChoice]]:
-    return [every[k : k + SIDE_BY_SIDE] for k in range(0, len(every), SIDE_BY_SIDE)]
 
 
 def _objectives(goals: Sequence[Objective]) -> list[Head]:
@@ -172,22 +164,12 @@ def _degrees(goals: Sequence[Objective]) -> list[Head]:
     return [Head(f"degree of {goal.name}", digits=4) for goal in goals]
 
 
-def _numbers(degrees: np.ndarray) -> list[Cell]:
+def _numbers(degrees: Iterable[float]) -> list[Cell]:
     return [None if np.isnan(one) else float(one) for one in degrees]
 
 
-def _verified(point: Point) -> str:
-    return "yes" if point.verified else "-" if point.verified is None else "no"
-
-
-def _measures(every: Sequence[RunChoice]) -> str:
-    """The ranges by which objectives were normalised, solver by solver."""
-    words = []
-    for solver in dict.fromkeys(one.solver for one in every):
-        first = next(one for one in every if one.solver == solver)
-        ends = ", ".join(
-            f"{label(goal.name, goal.unit)} {first.ranges.best[goal.name]:.5g} to {first.ranges.worst[goal.name]:.5g}"
-            for goal in first.point.goals
-        )
-        words.append(f"Ranges of {solver}, best to worst: {ends}.")
-    return " ".join(words)
+def _ranges(first: RunChoice) -> str:
+    """The ranges by which a solver normalised objectives."""
+    best, worst = first.ranges.best, first.ranges.worst
+    ends = [f"{label(goal.name, goal.unit)} {best[goal.name]:.5g} to {worst[goal.name]:.5g}" for goal in first.point.goals]
+    return f"Ranges of {first.solver}, best to worst: {', '.join(ends)}."

@@ -1,4 +1,4 @@
-"""Figures of studies: collective fronts, attainment surfaces, convergence. At the width of a column, without a display.
+"""Figures of studies for papers: collective fronts, attainment surfaces, convergence. At the width of a column, without a display.
 
 Every function returns a matplotlib `Figure` of no window; `figure.savefig` writes it.
 """
@@ -34,6 +34,32 @@ MARKERS = "o^sDvPX*"
 """One more than there are colours, so that no two of many solvers look alike."""
 
 
+def style() -> Any:
+    """A context in which figures are drawn as papers want them."""
+    import matplotlib
+
+    return matplotlib.rc_context(PAPER)  # type: ignore[arg-type]
+
+
+def new_figure(width: float, height: float) -> Any:
+    """A figure of no window."""
+    figure = blank_figure()
+    figure.set_size_inches(width, height)
+    return figure
+
+
+def legend(figure: Any, ax: Any, title: str = "") -> None:
+    """The legend of the axes, above them, where no line is; the figure is higher by it."""
+    handles, names = ax.get_legend_handles_labels()
+    look = {"frameon": False, "title": title or None, "title_fontsize": 7, "alignment": "left"}
+    for columns in range(min(len(names), 6), 0, -1):
+        above = figure.legend(handles, names, loc="outside upper left", ncols=columns, **look)
+        if columns == 1 or above.get_window_extent().width <= figure.bbox.width:
+            figure.set_figheight(figure.get_figheight() + 0.16 * (-(-len(names) // columns) + bool(title)))
+            return
+        above.remove()
+
+
 def front_figure(
     fronts: Mapping[str, Sequence[Points]],
     *,
@@ -63,14 +89,14 @@ def front_figure(
                 points = [minimised(front, goals) * signs for front in runs]
                 name = _runs(solver, len(runs), sum(not len(part) for part in points))
                 every = np.vstack([part for part in points if len(part)] or [np.empty((0, m))])
-                points_style = {"ms": 3.2, "mew": 0.3, "mec": "white", "alpha": 0.65, "color": COLORS[k % len(COLORS)]}
-                ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **points_style)
+                look = {"ms": 3.2, "mew": 0.3, "mec": "white", "alpha": 0.65, "color": COLORS[k % len(COLORS)]}
+                ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **look)
             if marked is not None:
-                _mark(ax, minimised(marked, goals) * signs, signs, (i, j))
+                _mark(ax, (minimised(marked, goals) * signs)[:, [i, j]], signs[[i, j]])
             ax.set(xlabel=wrapped(better(goals[i]), room), ylabel=wrapped(better(goals[j]), room))
         for ax in grid[len(pairs) :]:
             ax.remove()
-        legend(figure, grid[0], "best" if len(pairs) == 1 else None)
+        legend(figure, grid[0])
     return figure
 
 
@@ -94,9 +120,9 @@ def attainment_figure(
     columns = min(3, len(surfaces))
     rows = -(-len(surfaces) // columns)
     with style():
-        figure = new_figure(COLUMN if columns == 1 else PAGE, 2.6 * rows)
+        width = COLUMN if columns == 1 else PAGE
+        figure = new_figure(width, 2.6 * rows)
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
-        width = (COLUMN if columns == 1 else PAGE) / columns - 0.3  # inches for the numbers of the axis
         for k, (ax, (solver, surface)) in enumerate(zip(grid, surfaces.items(), strict=False)):
             if reference is not None:
                 _draw_truth(ax, truth(reference, goals), signs, (0, 1), truth_name)
@@ -105,19 +131,14 @@ def attainment_figure(
             ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
             ax.set(xlabel=better(goals[0]), ylabel=better(goals[1]))
             ax.label_outer()
-            title_and_legend(ax, wrapped(_runs(solver, surface.runs, 0), width, 8.0))
+            title_and_legend(ax, wrapped(_runs(solver, surface.runs, 0), width / columns - 0.3, 8.0))  # the axis has numbers of 0.3 inches
         for ax in grid[len(surfaces) :]:
             ax.remove()
     return figure
 
 
 def convergence_figure(
-    histories: Mapping[str, Sequence[History]],
-    *,
-    xlabel: str,
-    ylabel: str,
-    larger: bool = False,
-    log: bool = True,
+    histories: Mapping[str, Sequence[History]], *, xlabel: str, ylabel: str, larger: bool = False, log: bool = True
 ) -> Figure:
     """An indicator over the cost of a run: the median of each solver's runs as a line, their quartiles as a band.
 
@@ -145,21 +166,20 @@ def convergence_figure(
             drawn = np.where(np.isfinite(median), median, np.nan)
             ax.plot(x, drawn, drawstyle="steps-post", color=color, lw=1.3, ls=("-", "--", "-.", ":")[k % 4], label=_runs(solver, b.runs, 0))
         if log:
-            ax.set_yscale("log")
-            _log_ticks(ax, high / low)
+            _log_axis(ax, high / low)
             ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)
         else:
             ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
         ax.set(xlim=(0, last), xlabel=xlabel, ylabel=ylabel)
-        # Where an indicator that converges usually leaves room.
-        legend(figure, ax, "lower right" if larger else "upper right", "median, quartiles")
+        legend(figure, ax, "median, quartiles")
     return figure
 
 
-def _log_ticks(ax: Any, ratio: float) -> None:
+def _log_axis(ax: Any, ratio: float) -> None:
     """Of less than two decades, plain numbers at 1, 2 and 5 of each; powers of ten otherwise."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+    ax.set_yscale("log")
     if ratio < 100:
         ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio > 5 else tuple(range(1, 10))))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -180,17 +200,17 @@ def _draw_truth(ax: Any, R: np.ndarray, signs: np.ndarray, pair: tuple[int, int]
         ax.plot(*(R * signs)[:, pair].T, ".", color=GREY, ms=2.0, zorder=1, label=name)
 
 
-def _mark(ax: Any, values: np.ndarray, signs: np.ndarray, pair: tuple[int, int]) -> None:
-    """Crosses, and numbers on their better side, where no point can be in the way."""
-    i, j = pair
-    ax.plot(values[:, i], values[:, j], "+", color="black", ms=7, mew=1.0, zorder=5)
-    sides = {"ha": "right" if signs[i] > 0 else "left", "va": "top" if signs[j] > 0 else "bottom"}
-    for number, place in enumerate(values[:, [i, j]], 1):
-        ax.annotate(str(number), place, xytext=(-3 * signs[i], -3 * signs[j]), textcoords="offset points", fontsize=7, zorder=6, **sides)
+def _mark(ax: Any, places: np.ndarray, signs: np.ndarray) -> None:
+    """Crosses at places (n, 2), and numbers on their better side, where no point can be in the way."""
+    ax.plot(*places.T, "+", color="black", ms=7, mew=1.0, zorder=5)
+    sides = {"ha": "right" if signs[0] > 0 else "left", "va": "top" if signs[1] > 0 else "bottom"}
+    for number, place in enumerate(places, 1):
+        ax.annotate(str(number), place, xytext=tuple(-3 * signs), textcoords="offset points", fontsize=7, zorder=6, **sides)
     ax.margins(0.07)
 
 
 def _draw_surfaces(ax: Any, surface: Attainment, ends: np.ndarray, color: str) -> None:
+    """Lines for the best, median and worst surface, and the area between the first and the last."""
     drawn = {}
     for name, corners, look in (
         ("best", surface.best, {"lw": 0.8, "ls": "--"}),
@@ -205,52 +225,3 @@ def _draw_surfaces(ax: Any, surface: Attainment, ends: np.ndarray, color: str) -
     if "best" in drawn and "worst" in drawn:
         border = np.vstack([drawn["best"], drawn["worst"][::-1]])
         ax.fill(*border.T, color=color, alpha=0.18, lw=0, zorder=3)
-
-
-def style() -> Any:
-    """A context in which figures are drawn as papers want them."""
-    import matplotlib
-
-    return matplotlib.rc_context(PAPER)  # type: ignore[arg-type]
-
-
-def new_figure(width: float, height: float) -> Any:
-    """A figure of no window."""
-    figure = blank_figure()
-    figure.set_size_inches(width, height)
-    return figure
-
-
-def legend(figure: Any, ax: Any, place: str | None, title: str = "") -> None:
-    """The legend of the axes: inside them at `place` if it has few entries and no line is behind it, else above them."""
-    handles, names = ax.get_legend_handles_labels()
-    look = {"frameon": False, "title": title or None, "title_fontsize": 7, "alignment": "left"}
-    within = ax.legend(handles, names, loc=place, **look) if place and len(names) <= 4 else None
-    if within is not None and _covers(figure, ax, within):
-        within.remove()
-        within = None
-    if within is None:
-        for columns in range(min(len(names), 6), 0, -1):
-            above = figure.legend(handles, names, loc="outside upper left", ncols=columns, **look)
-            if columns == 1 or above.get_window_extent().width <= figure.bbox.width:
-                break
-            above.remove()
-        rows = -(-len(names) // columns) + bool(title)
-        figure.set_figheight(figure.get_figheight() + 0.16 * rows)
-
-
-def _covers(figure: Any, ax: Any, within: Any) -> bool:
-    """Whether lines, markers or areas of the axes are behind their legend."""
-    # That lays it out, and does not draw it.
-    figure.get_layout_engine().execute(figure)
-    box = within.get_window_extent()
-    for line in ax.get_lines():
-        path = line.get_path().transformed(line.get_transform())
-        joined = line.get_linestyle() != "None"
-        if path.intersects_bbox(box, filled=False) if joined else box.count_contains(path.vertices):
-            return True
-    for area in (*ax.collections, *ax.patches):
-        paths = area.get_paths() if hasattr(area, "get_paths") else [area.get_path()]
-        if any(path.transformed(area.get_transform()).intersects_bbox(box, filled=True) for path in paths if len(path.vertices)):
-            return True
-    return False

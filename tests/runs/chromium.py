@@ -53,23 +53,10 @@ def errors(browser) -> list[str]:
 def opened_alone(page: Path, settled: float = 1.0) -> tuple[float, float, list[str]]:
     """Open a page in a new browser as its readers do: nothing listens to it meanwhile.
 
-    A driver listens to the console. Each error that a script throws then has the browser read that script again for the lines of its trace,
-    also if the script catches it: of the drawing package this takes half a second that no reader waits for.
-
-    Parameters
-    ----------
-    page : Path
-    settled : float
-        Seconds that the browser has before, to end its own start.
-
-    Returns
-    -------
-    seconds : float
-        Until the page says that its figures are there.
-    work : float
-        Seconds of processor time of the page's main thread, until it has been read and drawn.
-    errors : list of str
-        That the page has thrown and not caught.
+    A driver listens to the console. Each error that a script throws then has the browser read that script again for the lines of its trace:
+    of the drawing package this takes half a second that no reader waits for. The browser has `settled` seconds to end its own start.
+    Returns the seconds until the page says that its figures are there, the seconds of processor time of its main thread until it has been
+    read and drawn, and the errors that it has thrown and not caught.
     """
     import websocket
 

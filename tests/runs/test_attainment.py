@@ -1,4 +1,4 @@
-"""Attainment surfaces: by hand, against moocore, and against their definition."""
+"""What many runs attain: surfaces by hand, against moocore and their definition; histories as median and quartiles."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
-from runs.measures.attainment import attainment, staircase
+from runs.measures.attainment import attainment, band, staircase
 from runs.measures.references import foreign
 
 A = np.array([[1.0, 3.0], [3.0, 1.0]])
@@ -57,12 +57,6 @@ def test_senses_and_what_did_not_converge():
     assert mixed.worst.tolist() == found.worst.tolist()
 
 
-def test_there_are_as_many_surfaces_as_runs():
-    found = attainment([A] * 30)
-    with pytest.raises(ValueError, match="1 to 30 runs, not of 31"):
-        found.of(31)
-
-
 def test_what_has_no_surfaces():
     with pytest.raises(ValueError, match="no run"):
         attainment([])
@@ -81,3 +75,28 @@ def test_a_staircase_bounds_what_is_dominated():
     assert plain.tolist() == [[1, 6], [1, 3], [3, 3], [3, 1], [5, 1]]
     turned = staircase(A * [1, -1], np.array([1, -1]), np.array([5.0, -6.0]))
     assert (turned * [1, -1]).tolist() == plain.tolist()
+
+
+def test_a_band_by_hand():
+    runs = [(np.array([1.0, 3.0]), np.array([10.0, 4.0])), (np.array([2.0]), np.array([6.0])), (np.array([1.0, 2.0]), np.array([8.0, 1.0]))]
+    found = band(runs)
+    assert found.x.tolist() == [1, 2, 3] and found.runs == 3
+    # Before its first sample the second run has failed; after its last each keeps its value.
+    assert found.median.tolist() == [10.0, 6.0, 4.0]
+    assert found.lower.tolist() == [9.0, 3.5, 2.5] and found.upper.tolist() == [np.inf, 8.0, 5.0]
+    mirrored = band([(x, -y) for x, y in runs], larger=True)
+    assert mirrored.median.tolist() == (-found.median).tolist() and mirrored.lower.tolist() == (-found.upper).tolist()
+
+
+def test_empty_fronts_are_worst():
+    x = np.array([0.0, 1.0])
+    found = band([(x, np.array([np.nan, 2.0])), (x, np.array([np.inf, 3.0])), (x, np.array([1.0, 1.0]))])
+    assert found.median.tolist() == [np.inf, 2.0] and found.lower.tolist() == [np.inf, 1.5]
+
+
+def test_what_is_no_history():
+    with pytest.raises(ValueError, match="no run"):
+        band([])
+    for x, y in (([2.0, 1.0], [1.0, 1.0]), ([1.0], [1.0, 2.0]), ([], [])):
+        with pytest.raises(ValueError, match="run 0: moments"):
+            band([(np.array(x), np.array(y))])

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from misbehaving import Crashing, Plain, glide
-from synthetic_fronts import black_box, empty, flights, marked, with_optional_phase
+from synthetic_fronts import black_box, flights, marked, with_optional_phase
 from test_study import Inline
 
 from macs import optimize
@@ -22,7 +22,7 @@ from runs import Study
 from runs.batch.store import Store
 from runs.browser import page as pages
 from runs.browser.pages import front_page, study_page
-from runs.browser.points import LIMITS, curves, differences, samples_of, thinned
+from runs.browser.points import LIMITS, curves, differences, thinned
 from runs.cli import main
 from transcription import parse
 
@@ -137,20 +137,6 @@ def test_a_page_loads_nothing_and_stays_small():
     assert front_page(flights(10)) == content  # the same bytes for the same front
 
 
-def test_the_drawing_package_comes_without_what_is_for_loaders_of_modules(monkeypatch):
-    from plotly.offline import get_plotlyjs
-
-    whole, told = get_plotlyjs(), pages.plotly().decode()
-    assert whole.index("self : this") < 1000 and "self : this" not in told[:1000]
-    assert "Licensed under the MIT license" in told[:200] and told.rstrip().endswith("window.Plotly = Plotly;")
-    assert 0 < len(whole) - len(told) < 500
-    # One that is wrapped otherwise is taken as it is.
-    pages.plotly.cache_clear()
-    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "window.Plotly = {};")
-    assert pages.plotly() == b"window.Plotly = {};"
-    pages.plotly.cache_clear()
-
-
 EVIL = "</script><script>alert(1)</script><!-- {{style}} %{x} $a$ & <b>"
 
 
@@ -170,12 +156,6 @@ def test_an_evil_name_ends_no_script_and_no_title():
     assert named.title == EVIL
 
 
-def test_fronts_without_points_or_trajectories_have_pages():
-    assert Reader(front_page(empty())).data["comparisons"][0]["runs"][0]["points"]["count"] == 0
-    told = Reader(front_page(black_box(4))).block("0")
-    assert [one["phases"] for one in told] == [[]] * 4 and len(told[0]["parameters"]) > 0
-
-
 def test_thinned_curves_keep_their_pulses():
     values = np.zeros(10_000)
     values[[1234, 7000]] = 5.0, -3.0
@@ -188,25 +168,6 @@ def test_rounded_values_differ_by_a_millionth_of_their_range(values):
     array = np.array(values)
     found = values_of(differences(array))
     assert np.abs(found - array).max() <= max(1e-6 * np.ptp(array), 1e-10 * np.abs(array).max()) * 1.001
-
-
-def test_differences_pass_over_gaps():
-    assert differences(np.array([2.0, np.nan, 3.0, np.inf, 5.0])) == [6, 2000000, None, -3000000, None, 2000000]
-    assert differences(np.array([np.nan])) == [0, None] and differences(np.array([])) == [0]
-    assert values_of(differences(np.array([2e12, np.nan, 3e12]))).tolist() == pytest.approx([2e12, np.nan, 3e12], nan_ok=True)
-
-
-def test_curves_of_smooth_trajectories_take_a_third_of_the_room_of_their_values():
-    told = curves(flights(1)[0].trajectory, None, 400)
-    listed = [one["v"] for phase in told for one in phase["quantities"]]
-    plain = pages.packed([values_of(one).tolist() for one in listed])
-    assert len(pages.packed(listed)) < 0.4 * len(plain)
-
-
-def test_many_points_have_fewer_samples():
-    few, many = samples_of([flights(5)]), samples_of([flights(20)] * 2500)
-    assert few > many >= 48
-    assert len(curves(flights(1)[0].trajectory, None, 48)) == 2
 
 
 @pytest.fixture(scope="module")
@@ -233,15 +194,6 @@ def test_the_page_of_a_study_has_its_runs_measures_tables_and_failures(folder):
     assert set(comparison["attainment"]) <= {"one", "other", "broken"} and comparison["convergence"]
     assert any("points claimed" in one["caption"] for one in comparison["tables"])
     assert reader.data["tables"] == []
-
-
-def test_the_page_of_a_study_has_published_tables_and_its_note(folder):
-    store = Store.open(folder, trust=True)
-    (problem,) = {run.cell.problem for run in store.runs()}
-    paper = {"of": "indicators", "source": "A. Author, Table I", "rows": [{"problem": problem, "by": "the paper", "gd_mean": 0.5}]}
-    stated = Store(store.path, {**store.definition, "paper": [paper], "note": "Two of each."}, trust=True)
-    data = Reader(study_page(stated)).data
-    assert data["note"] == "Two of each." and any("A. Author" in one["caption"] for one in data["tables"])
 
 
 @pytest.mark.slow

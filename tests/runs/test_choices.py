@@ -55,7 +55,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def told(folder) -> str:
-    return str(study().report(folder))
+    return str(study().report(folder, figures=False))
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -63,7 +63,6 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-@pytest.mark.slow
 def test_every_choice_has_a_row_those_that_are_alike_too(folder, told):
     rows = rows_of(folder / "report" / "glide-dfet-2x2-choices.csv")
     assert [row["choice"] for row in rows] == ["goals, regulating 0", "goals, regulating 0.1", "goals, regulating 0.2", "even"]
@@ -76,7 +75,9 @@ def test_every_choice_has_a_row_those_that_are_alike_too(folder, told):
     assert all(row["verified"] == "yes" for row in rows)
 
 
-def test_what_compares_fronts_is_left_out_and_pictures_are_drawn(folder, told):
+@pytest.mark.slow
+def test_what_compares_fronts_is_left_out_and_pictures_are_drawn(folder):
+    study().report(folder)
     names = {path.name for path in (folder / "report").iterdir()}
     assert not any("indicators" in name or "attainment" in name for name in names)
     for figure in ("degrees-choices", "flights-choices", "lambda-choices-1"):
@@ -119,11 +120,3 @@ def test_published_degrees_that_make_no_sense_are_refused_at_once(paper, words):
     with pytest.raises(ValueError, match=r"\[\[paper\]\] 1, of degrees") as error:
         study(paper=[paper])
     assert words in str(error.value)
-
-
-@pytest.mark.parametrize("name", ["skip-table5", "smv-compare", "smv-scenario1", "smv-scenario2"])
-def test_the_papers_studies_load_and_their_choices_are_of_the_problem(name):
-    given = Study.load(name)
-    assert given.quick().name == f"{name}-quick"
-    assert all(cell.details["solver"]["name"] == "Decide" for cell in given.cells)
-    assert given.paper and all(paper["differs"] for paper in given.paper)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from zlib import crc32
 
@@ -19,7 +18,6 @@ from runs import Study
 from runs.batch.store import Store
 from runs.files import from_record, to_record
 from runs.report.comparison import Counting, comparisons
-from runs.report.published import papers, published_tables
 
 ENDS = [{"name": "miss", "state": "x", "at": 2.0, "unit": "cm", "factor": 100.0}, {"name": "speed", "state": "v", "at": 0.0}]
 ROW = {"problem": "braking", "by": "the paper"}
@@ -56,14 +54,6 @@ def folder(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("brakes") / "out"
     assert study().run(out, executor=Inline()).finished == 4
     return out
-
-
-@pytest.mark.slow
-def test_captions_name_a_problem_that_has_an_address_by_its_own_name(folder):
-    comparison = comparisons(Store.open(folder), {})[0]
-    addressed = replace(comparison, problem="brakes.py:build")
-    assert addressed.shown == "braking" and addressed.name == "braking, dfet:1x2"
-    assert replace(comparison, problem="heavy").name == "heavy, dfet:1x2", "a label that somebody chose"
 
 
 @pytest.mark.slow
@@ -148,17 +138,6 @@ def test_published_ends_and_feasibility_beside_ours(folder):
     assert "macs, dfet:1x2" not in rows, "it has no population"
 
 
-@pytest.mark.slow
-def test_without_flights_points_are_what_the_solver_says(tmp_path):
-    given = study(verify=None)
-    given.run(tmp_path / "out", executor=Inline())
-    comparison = comparisons(Store.open(tmp_path / "out"), {})[0]
-    for run, verified in zip(comparison.runs["macs"], comparison.counting["macs"], strict=True):
-        np.testing.assert_array_equal(verified.front.F, run.front.F)
-        np.testing.assert_array_equal(verified.ends["run"]["x"], [p.trajectory["run"].edge_states[-1, 0] for p in run.front])
-    assert "claimed" not in str(given.report(tmp_path / "out", figures=False)).replace("not dominated, claimed", "")
-
-
 def test_points_whose_flights_are_lost_are_simulated_again_if_their_problem_is_found(folder, tmp_path):
     shutil.copytree(folder, tmp_path / "out")
     files = sorted((tmp_path / "out").glob("*/000?.json"))
@@ -167,24 +146,6 @@ def test_points_whose_flights_are_lost_are_simulated_again_if_their_problem_is_f
     files[1].unlink()
     with pytest.raises(ValueError, match=r"points of run 1 of braking, dfet:1x2, \w+ cannot be simulated: .* was stated in a script"):
         study().report(tmp_path / "out")
-
-
-@pytest.mark.slow
-def test_a_flight_that_fails_costs_no_run(tmp_path, monkeypatch, caplog):
-    def fails(front, tolerance):
-        raise RuntimeError("no air")
-
-    monkeypatch.setattr("runs.execution.task.record", fails)
-    assert study().run(tmp_path / "out", executor=Inline()).finished == 4
-    assert "could not be simulated" in caplog.text
-
-
-def test_reports_of_runs_that_are_not_there_yet(folder, tmp_path):
-    shutil.copytree(folder, tmp_path / "out")
-    for path in (tmp_path / "out").glob("*nsga2*/*"):
-        path.unlink()
-    text = str(study().report(tmp_path / "out", figures=False))
-    assert "nsga2: 2 missing" in text and "points claimed, and points verified" in text
 
 
 def test_points_are_simulated_unless_a_study_says_no(tmp_path):
@@ -198,59 +159,3 @@ def test_points_are_simulated_unless_a_study_says_no(tmp_path):
     (tmp_path / "mine.toml").write_text(text + "verify = true\n", encoding="utf-8")
     with pytest.raises(ValueError, match="verify must be a positive number, not True"):
         Study.load(tmp_path / "mine.toml")
-
-
-def test_a_run_keeps_only_final_states_beside_its_front(folder):
-    for run in Store.open(folder).runs():
-        front = Front.load(run.path)
-        assert front.stats["verify"] == 0.01 and front.was_simulated.all()
-        assert set(run.simulated) == {"ends"} and {len(values) for values in run.simulated["ends"]["run"].values()} == {len(front)}
-
-
-def test_a_problem_without_a_transcription_gets_the_first_mesh():
-    problem = braking()
-    problem.default_transcription = None
-    (cell,) = Study("plain", problems=problem, solvers="nsga2", evaluations=50, runs=1, seed=1).cells
-    assert cell.transcription == "dfet:8x3:bernstein"
-
-
-@pytest.mark.parametrize(("value", "message"), [(0.0, "verify must be a positive number"), ("much", "verify must be a positive number")])
-def test_how_much_may_be_violated_is_a_number(value, message):
-    with pytest.raises(ValueError, match=message):
-        study(verify=value)
-
-
-@pytest.mark.parametrize(
-    ("ends", "message"),
-    [
-        ([], "ends must be a list of tables"),
-        ("x", "ends must be a list of tables"),
-        ([{"name": "miss"}], "ends 1: state is missing"),
-        ([{**ENDS[0], "at": "2"}], "ends 1: at must be a finite number"),
-        ([{**ENDS[0], "at": float("inf")}], "ends 1: at must be a finite number"),
-        ([ENDS[0], ENDS[0]], "ends: 'miss' is there twice"),
-        ([{**ENDS[0], "unit": 2}], "ends 1: unit must be a text"),
-        ([{**ENDS[0], "units": "m"}], "units"),
-    ],
-)
-def test_ends_that_make_no_sense_are_refused(ends, message):
-    with pytest.raises(ValueError, match=message):
-        papers([{"of": "ends", "ends": ends, "rows": [{**ROW, "statistic": "mean", "miss": 5.0}]}])
-
-
-def test_a_state_that_does_not_exist_is_named(folder):
-    paper = {"of": "ends", "ends": [{"name": "miss", "state": "y", "at": 0.0}], "rows": [{**ROW, "statistic": "mean", "miss": 5.0}]}
-    with pytest.raises(ValueError, match="unknown state 'y'; there are x, v"):
-        published_tables(comparisons(Store.open(folder), {}), {"paper": [paper]})
-
-
-@pytest.mark.slow
-def test_where_nothing_is_found_the_report_says_so(tmp_path):
-    truth = tmp_path / "truth.csv"
-    truth.write_text("distance [m],effort\n1,3\n2,15\n")
-    nothing = study(problems=braking(pace=100.0), reference=str(truth))
-    nothing.run(tmp_path / "out", executor=Inline())
-    text = str(nothing.report(tmp_path / "out"))
-    assert "no run found a point that counts" in text and "braking, dfet:1x2: costs of a run" in text
-    with (tmp_path / "out" / "report" / "published-3.csv").open() as file:
-        assert [row["best"] for row in csv.DictReader(file)] == ["3.0", "0.0", "0.0"]

@@ -5,17 +5,14 @@ from __future__ import annotations
 import moocore
 import numpy as np
 import pytest
-from fronts import distance_to_curve, inverted_distance
 
 import runs
-from macs import MACS, Front
-from problems import load
-from problems.cases import goddard, orbit_rise
+from macs import Front
+from problems.cases import goddard
 from problems.compiled import Objective
 from runs import additive_epsilon, gd, hypervolume, igd, igd_plus
 from runs.measures.indicators import hypervolume_at
 from runs.measures.references import foreign
-from transcription import DFET
 
 LINE = np.column_stack([np.linspace(0, 1, 101), np.linspace(1, 0, 101)])
 CORNERS = np.array([[0.0, 1.0], [1.0, 0.0]])
@@ -31,7 +28,7 @@ def reference(m: int) -> np.ndarray:
     return points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
-@pytest.mark.parametrize("m", [2, 3, 4])
+@pytest.mark.parametrize("m", [2, 4])
 def test_as_moocore_has_them(m):
     F, R = fronts(m, 7, 1), reference(m)
     F_, R_ = (np.ascontiguousarray((A - R.min(axis=0)) / np.ptp(R, axis=0)) for A in (F, R))
@@ -43,14 +40,7 @@ def test_as_moocore_has_them(m):
     assert hypervolume(F, R, normalise=False) == pytest.approx(hypervolume(F, R) * np.ptp(R, axis=0).prod(), rel=1e-9)
 
 
-@pytest.mark.parametrize("m", [2, 3])
-def test_average_hausdorff_is_the_larger_of_both_distances(m):
-    F, R = fronts(m, 9, 2), reference(m)
-    both = max(gd(F, R, normalise=False), igd(F, R, normalise=False))
-    assert both == pytest.approx(moocore.avg_hausdorff_dist(F, ref=R, p=1), rel=1e-12)
-
-
-@pytest.mark.parametrize("name", ["zdt1", "zdt2", "zdt3", "zdt4", "dtlz1", "dtlz2"])
+@pytest.mark.parametrize("name", ["zdt1", "zdt3", "dtlz2"])
 def test_as_pymoo_has_them_on_its_own_fronts(name):
     from pymoo.indicators.gd import GD
     from pymoo.indicators.hv import HV
@@ -69,23 +59,6 @@ def test_as_pymoo_has_them_on_its_own_fronts(name):
         assert ours(F, R) == pytest.approx(theirs(R, **scale)(F), rel=1e-10)
         assert ours(F, R, normalise=False) == pytest.approx(theirs(R)(F), rel=1e-10)
     assert hypervolume(F, R) == pytest.approx(HV(ref_point=np.full(truth.shape[1], 1.1))((F - ideal) / (nadir - ideal)), rel=1e-10)
-
-
-@pytest.mark.parametrize("name", ["zdt1", "zdt2", "zdt4"])
-def test_to_a_curve_is_nearer_than_to_its_points(name):
-    """The difference by definition: at most half the spacing of the points."""
-    from pymoo.indicators.gd import GD
-    from pymoo.indicators.igd import IGD
-    from pymoo.problems import get_problem
-
-    truth = get_problem(name).pareto_front()
-    for ours, theirs in ((gd, GD), (igd, IGD)):
-        assert ours(truth * 1.05, truth, normalise=False, curve=False) == pytest.approx(theirs(truth)(truth * 1.05), rel=1e-10)
-    spacing = np.linalg.norm(np.diff(truth, axis=0), axis=1).max()
-    F = truth[5::10] * [1.0, 1.02]
-    assert gd(F, truth) <= GD(truth)(F) + 1e-12 <= gd(F, truth) + spacing / 2 + 1e-9
-    # The mean along the curve and over its points differ by how unevenly these lie.
-    assert igd(F, truth) == pytest.approx(IGD(truth)(F), rel=0.3)
 
 
 def test_what_did_not_converge_is_no_point():
@@ -142,6 +115,8 @@ def test_a_front_in_pieces_has_no_line_between_them():
     assert gd(np.array([[0.5, 0.5]]), pieces) == pytest.approx(0.2 * np.sqrt(2), rel=1e-9)
     assert gd(np.array([[0.105, 0.895]]), pieces) == pytest.approx(0.0, abs=1e-14)
     assert igd(pieces, pieces) < 0.01
+    cloud = np.vstack([LINE, LINE + 3.0])  # dominated points do not count
+    assert gd(LINE, cloud) == 0.0 and igd(LINE, cloud) == igd(LINE, LINE)
 
 
 def test_volumes_and_distances_in_closed_form():
@@ -156,13 +131,12 @@ def test_volumes_and_distances_in_closed_form():
         assert indicator(scaled + np.array([1e-4, 2e4]), scaled) == pytest.approx(indicator(LINE + np.array([0.1, 0.2]), LINE), rel=1e-6)
 
 
-@pytest.mark.parametrize("measure", [gd, igd, igd_plus, additive_epsilon, hypervolume])
-def test_fronts_of_other_objectives_are_not_compared(measure):
+def test_fronts_of_other_objectives_are_not_compared():
     goals = [Objective("time", "s"), Objective("fuel", "kg")]
     for others in (goals[::-1], [goals[0], Objective("fuel", "t")], [goals[0], Objective("fuel", "kg", "maximize")]):
         with pytest.raises(ValueError, match="the reference has other objectives: minimize"):
-            measure(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), others))
-    assert measure(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), [goals[0], Objective("fuel", "kg", scale=2.0)])) >= 0.0
+            gd(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), others))
+    assert gd(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), [goals[0], Objective("fuel", "kg", scale=2.0)])) >= 0.0
 
 
 def test_empty_fronts_and_nonsense():
@@ -177,25 +151,6 @@ def test_empty_fronts_and_nonsense():
         igd(np.zeros(2), LINE)
     with pytest.raises(AttributeError, match="hypervolum"):
         runs.hypervolum  # noqa: B018
-
-
-def test_dominated_points_of_a_reference_do_not_count():
-    cloud = np.vstack([LINE, LINE + 3.0])
-    assert gd(LINE, cloud) == 0.0 and igd(LINE, cloud) == igd(LINE, LINE)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", [goddard, orbit_rise])
-def test_fronts_against_what_the_user_sees(case):
-    """A Front knows its senses: the speed and the energy are maximised, and a reference beside it is as the user has it."""
-    truth = case.reference()
-    front = MACS().solve(load(case.__name__.rpartition(".")[2]), DFET(3, 1), evaluations=100, seed=1)
-    assert gd(front, truth) == pytest.approx(distance_to_curve(front.objectives, truth).mean(), rel=1e-6)
-    assert igd(front, truth) == pytest.approx(inverted_distance(front.objectives, truth), rel=1e-3)
-    signs = np.sign(front.F[-1]) * np.sign(front.objectives[-1])
-    assert hypervolume(front, truth) == hypervolume(front.F, truth * signs)
-    assert hypervolume(truth, front) == hypervolume(truth * signs, front.F)
-    assert igd(front, front) < 1e-12 and additive_epsilon(front, front) == 0.0
 
 
 def test_a_volume_up_to_a_point_is_in_the_units_and_senses_of_the_user():

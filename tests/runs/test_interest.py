@@ -43,14 +43,6 @@ def test_points_outside_the_region_cover_nothing_of_it():
     assert interest.missing(nothing) == pytest.approx(1.0) and interest.worse(nothing) == np.inf
 
 
-def test_units_and_senses_do_not_matter():
-    turned = [Objective("a", "mm"), Objective("b", "", "maximize")]
-    other = Interest.of(ReferencePoint({"a": 0.0, "b": 0.0}, augmentation=0.0), turned, line() * [1e3, -1.0])
-    here = Interest.of(EVENLY, GOALS, line())
-    few = line(6)[1:-1] + 0.01
-    assert other.missing(plain_front(few * [1e3, -1.0], turned)) == pytest.approx(here.missing(plain_front(few, GOALS)))
-
-
 def test_beyond_hard_limits_nothing_is_of_interest():
     wanted = PhysicalProgramming({"a": Smaller(0.1, 0.2, 0.3, 0.4, 0.5), "b": Smaller(0.5, 0.6, 0.7, 0.8, 0.9)})
     interest = Interest.of(wanted, GOALS, line())

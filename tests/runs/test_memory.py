@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from runs.cli import main
-from runs.execution.task import is_memory_error, peak_memory
+from runs.execution.task import peak_memory
 
 ROOT = Path(__file__).parents[2]
 
@@ -38,22 +38,10 @@ def test_want_of_memory_is_one_line(tmp_path, monkeypatch, capsys, error, words)
 def test_the_peak_of_a_process_is_its_own():
     """Not that of the process that started it, which is what `getrusage` says on Linux."""
     code = "from runs.execution.task import peak_memory; print(peak_memory()); block = b'x' * (100 * 2**20); print(peak_memory())"
-    block = b"x" * (400 * 2**20)
+    block = b"x" * (250 * 2**20)
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     before, after = map(float, answer.stdout.split())
-    assert peak_memory() > len(block) / 2**20 and before < 300 and 100 <= after - before < 110
-
-
-def test_other_errors_are_not_for_want_of_memory(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert not is_memory_error(RuntimeError("no convergence")) and not is_memory_error(ValueError("bad_alloc"))
-
-    def broken(*_, **__):
-        raise RuntimeError("a defect of ours")
-
-    monkeypatch.setattr("macs.solvers.solver.Solver.solve", broken)
-    with pytest.raises(RuntimeError, match="a defect of ours"):
-        main(["solve", "four_bar_truss"])
+    assert peak_memory() > len(block) / 2**20 and before < 240 and 100 <= after - before < 110
 
 
 @pytest.mark.slow

@@ -1,9 +1,10 @@
-"""Pages of studies, and what only verified points and counted work may decide in reports."""
+"""Pages of measured results, their headers, and what only verified points and counted work may decide in reports."""
 
 from __future__ import annotations
 
 import hashlib
 import shutil
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +12,16 @@ import pytest
 from misbehaving import Plain
 from test_study import Inline
 
-from macs import MACS, NSGA2
+from macs import NSGA2
 from macs.front import Front
 from macs.fronts.points import Points
+from macs.fronts.provenance import versions
 from runs import Study
 from runs.batch.store import Store
 from runs.cli import main
+from runs.report import page as page_header
 from runs.report.comparison import AXES, CHARGED, Charge, comparisons, histories, spent
-from runs.report.page import PageHeader
-from runs.report.tables import Head, table
+from runs.report.page import PageHeader, digest
 
 TOML = """name = "small"
 description = "A small study"
@@ -84,17 +86,6 @@ def test_no_page_of_a_study_that_has_changed_or_is_not_finished(place, capsys):
         lost.write_bytes(content)
         lost.with_suffix(".json").write_bytes(record)
     assert page_of(place, "--no-figures") == 2 and not page.exists()
-
-
-def test_the_paper_settings_have_a_word(place):
-    solvers = {cell.solver: cell.details["solver"]["settings"] for cell in Store.open(place / "out").cells}
-    assert solvers["as published"] == MACS.paper().about()["settings"] != solvers["plain"]
-    for wrong, words in (
-        ({"solver": "nsga2", "paper": True}, "no settings of a paper"),
-        ({"solver": "macs", "paper": 1.5}, "true or false"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            Study("wrong", problems="goddard", solvers={"one": wrong}, evaluations=10, runs=1, seed=1)
 
 
 def test_gradient_solves_are_charged_by_counted_work(place):
@@ -166,7 +157,37 @@ def test_unions_hold_only_what_a_simulation_found(place, tmp_path):
     np.testing.assert_array_equal(foreign.union().front.F, before.union().front.F)
 
 
-def test_markdown_of_a_table():
-    text = table([Head("name"), Head("size", "m")], [["a|b", 1.5], ["c", None]], "A caption.", ["A note."]).markdown()
-    rows = ["| name | size [m] |", "| :--- | ---: |", r"| a\|b | 1.50 |", "| c | - |"]
-    assert text.splitlines() == ["**A caption.**", "", *rows, "", "A note."]
+def test_header_as_written_is_read_again(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_bytes(b'name = "one"\n')
+    header = PageHeader.now("macs study report out/one --page one.md", digest(file))
+    assert header.date == date.today().isoformat()
+    assert header.digest == hashlib.sha256(b'name = "one"\n').hexdigest() == digest(file)
+    text = str(header)
+    assert text.splitlines()[0] == "<!-- made by: macs study report out/one --page one.md"
+    assert [line.split(": ")[0] for line in text.splitlines()[1:]] == ["digest", "version", "date"] and text.endswith(" -->")
+    assert PageHeader.read(f"{text}\n\n# One\n\n<!-- more -->\n") == header
+
+
+def test_the_version_is_of_the_code_that_searches(tmp_path, monkeypatch):
+    (tmp_path / "macs").mkdir()
+    module = tmp_path / "macs" / "search.py"
+    module.write_text("step = 1\n")
+    monkeypatch.setattr(page_header.macs, "__path__", [str(tmp_path / "macs")])
+    before = page_header.code()
+    assert page_header.code() == before and len(before) == page_header.CODE_DIGITS
+    assert page_header.version() == f"{versions()['macs-trajectories']}+{before}"
+    module.write_text("step = 2\n")
+    assert page_header.code() != before
+
+
+@pytest.mark.parametrize("text", ["# One\n", "<!-- made by: x\ndigest: y\nversion: z -->", "<!-- made by: x"])
+def test_what_is_no_header_is_refused(text):
+    with pytest.raises(ValueError, match="does not begin"):
+        PageHeader.read(text)
+
+
+@pytest.mark.parametrize("command", ["", "a --> b", "a\u2028b"])
+def test_entries_that_would_end_the_comment_are_refused(command):
+    with pytest.raises(ValueError, match="made by"):
+        PageHeader(command, "d", "v", "2026-01-01")

@@ -18,7 +18,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from misbehaving import Crashing, Gated, Plain, Slow, glide
+from misbehaving import Crashing, Plain, glide
 from synthetic_fronts import black_box, flights
 from test_study import Inline
 
@@ -287,17 +287,6 @@ def test_progress_that_is_old_or_damaged_is_none(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_study_says_how_it_proceeds_and_leaves_nothing_of_that_behind(tmp_path, monkeypatch):
-    told = []
-    original = StudyDisplay.refresh
-    monkeypatch.setattr(StudyDisplay, "refresh", lambda self: original(self) or told.append(read_progress(tmp_path / "out")))
-    Study("slow", problems={"glide": glide()}, solvers={"slow": Slow()}, evaluations=60, runs=1, seed=1).run(tmp_path / "out")
-    known = [one for one in told if one and one.going]
-    assert known and {run.number for one in known for run in one.going} == {1} and known[0].goals["glide"][0].name == "time"
-    assert not (tmp_path / "out" / PROGRESS_FILE).exists()
-
-
-@pytest.mark.slow
 def test_fronts_are_followed_one_alone_and_those_of_a_folder(tmp_path):
     flights(3).save(tmp_path / "first.nc")
     with served(tmp_path / "first.nc") as client:
@@ -362,27 +351,3 @@ def test_ctrl_c_ends_the_server_quietly_and_an_open_address_is_warned_of(out):
         server.send_signal(signal.SIGINT)
         rest, complaints = server.communicate(timeout=20)
         assert (server.returncode, rest) == (0, "") and complaints.count("\n") == 1 and "everybody on the network" in complaints
-
-
-@pytest.mark.slow
-def test_a_study_goes_on_when_its_server_is_killed(tmp_path):
-    gate = tmp_path / "gate"
-    stated = Study("gated", problems={"glide": glide()}, solvers={"gated": Gated(gate=str(gate))}, evaluations=60, runs=4, seed=1)
-    gate.touch()
-    expected = [run.front.F.tolist() for run in stated.run(tmp_path / "alone").runs]
-    gate.unlink()
-    found = []
-    runner = threading.Thread(target=lambda: found.append(stated.run(tmp_path / "out")))
-    runner.start()
-    while not (tmp_path / "out" / "study.json").exists():
-        time.sleep(0.01)
-    with process(str(tmp_path / "out"), "--port", "0") as (server, said):
-        port = int(said.split("http://127.0.0.1:")[1].split("/")[0])
-        client = Client(SimpleNamespace(server_address=("127.0.0.1", port)))
-        client.until(lambda status: status.get("running"))
-        server.kill()
-        server.wait()
-        assert runner.is_alive()
-    gate.touch()
-    runner.join()
-    assert [run.front.F.tolist() for run in found[0].runs] == expected and found[0].finished == 4

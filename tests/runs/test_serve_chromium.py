@@ -8,7 +8,6 @@ import time
 import pytest
 from chromium import NEEDS_CHROMIUM, errors, wait
 from misbehaving import Crashing, Gated, Plain, glide
-from synthetic_fronts import flights
 from test_serve import process, served, study
 from test_study import Inline
 
@@ -123,19 +122,4 @@ def test_a_study_that_really_runs_is_seen_from_its_beginning_to_its_end(browser,
             assert browser.execute_script("return byId('plot').data.some((one) => one.meta === 'going')") is False
             browser.execute_script("document.querySelector('#table tbody tr').click()")
             wait(browser, "byId('flights').dataset.drawn === state.selected")
-    assert others(browser) == []
-
-
-@pytest.mark.slow
-def test_fronts_are_followed(browser, tmp_path):
-    flights(3).save(tmp_path / "first.nc")
-    with served(tmp_path) as client:
-        opened(browser, client.server.url)
-        wait(browser, "state.points.length === 3 && byId('progress').hidden")
-        flights(5, seed=1).save(tmp_path / "second.nc")
-        wait(browser, "state.points.length === 8 && document.querySelectorAll('#choices input').length === 2")
-        assert browser.execute_script("return pointName(state.points[3])") == "second, point 0"
-    with served(tmp_path / "first.nc") as client:
-        opened(browser, client.server.url)
-        wait(browser, "state.points.length === 3 && byId('footer').textContent")
     assert others(browser) == []

@@ -1,4 +1,4 @@
-"""Fronts under changed data: what reports say and draw of a problem in which everything is known, and what is refused."""
+"""Fronts under changed data and dispersions: what reports say and draw where everything is known, and what is refused."""
 
 from __future__ import annotations
 
@@ -10,19 +10,21 @@ import pytest
 from misbehaving import Plain, glide
 from test_study import Inline
 
-from macs import NSGA2, Front
+from macs import Front
 from problems import Problem
+from problems.cases.aerocapture import coupled
 from runs import Study
 from runs.batch.store import Store
+from runs.report import sensitivity
 from runs.report.comparison import comparisons
 from runs.report.report import report
-from runs.report.sensitivity import LOOKS, SIMULATED_POINTS, ChangedData, changed_data, changed_figure
+from runs.report.sensitivity import SIMULATED_POINTS, ChangedData, DispersedFront, changed_data, dispersed_fronts
 
 CART = '''
 from problems import Problem
 
 
-def cart(mass=2.0, limit=50.0, weighed=False):
+def cart(mass=2.0, limit=50.0):
     """v' = u / mass from rest: with the same thrust, distance and speed go as 1 / mass."""
     problem = Problem("cart")
     phase = problem.phase("run", t0=0.0, tf=4.0)
@@ -33,9 +35,6 @@ def cart(mass=2.0, limit=50.0, weighed=False):
     phase.path("speed limit", v, upper=limit, scale=1.0)
     problem.maximize("distance", phase.final(x), unit="m")
     problem.minimize("effort", phase.integral(u), unit="N s")
-    if weighed:
-        problem.minimize("speed", phase.final(v), unit="m/s")
-        problem.minimize("square", phase.integral(u * u))
     return problem
 '''
 STUDY = """
@@ -111,6 +110,7 @@ def test_points_one_by_one_and_the_best_of_each_front(folder, changed):
         assert float(limited["effort [N s]"]) == pytest.approx(float(light["effort [N s]"]))
         assert light["feasible"] == "yes"
     assert {row["feasible"] for row in points[2::3]} == {"yes", "no"}
+    assert "The front of light under changed data." in str(report(folder, trust=True, figures=False))
     best = {row["optimised under"]: row for row in rows(changed, "changed-data-best")}
     for problem in ("light", "heavy", "limited"):
         front = union(folder, problem)
@@ -133,42 +133,6 @@ def test_a_panel_for_each_data(folder, changed):
 
 
 @pytest.mark.slow
-def test_of_many_objectives_a_row_for_each_data(tmp_path):
-    (tmp_path / "cart.py").write_text(CART, encoding="utf-8")
-    address = f"{tmp_path / 'cart.py'}:cart"
-    problems = {mass: {"problem": address, "weighed": True, "mass": float(mass)} for mass in ("2", "4", "5")}
-    study = Study(
-        "carts",
-        problems=problems,
-        transcriptions="shooting:5",
-        solvers=NSGA2(population=8),
-        evaluations=16,
-        runs=1,
-        seed=1,
-        inner="propagate",
-        nominal="2",
-    )
-    study.run(tmp_path / "out", executor=Inline())
-    (found,) = changed_data(comparisons(Store.open(tmp_path / "out", trust=True), {}), {"nominal": "2"})
-    figure = changed_figure(found.changes[0])
-    assert [ax.get_title("left") for ax in figure.axes] == ["4"] * 3 + ["5"] * 3
-    alone = [comparison for comparison in comparisons(Store.open(tmp_path / "out", trust=True), {}) if comparison.problem == "2"]
-    assert [one.figures() for one in changed_data(alone, {"nominal": "2"})] == [{}], "only the nominal front: nothing to draw"
-    marks = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == LOOKS["simulated under these data"]["mfc"]]
-    assert len(marks) == 1 and len(marks[0].get_xdata()) == len(found.changes[0].nominal)
-    assert [ax.get_xlabel() for ax in figure.axes[:3]] == [""] * 3 and "distance" in figure.axes[5].get_xlabel()
-
-
-@pytest.mark.slow
-def test_the_report_has_all_of_it(folder):
-    said = str(report(folder, trust=True, figures=False))
-    assert "The front of light under changed data." in said and "Points of the front of light" in said
-    names = {path.name for path in (folder / "report").iterdir()}
-    assert {f"changed-data{part}.{suffix}" for part in ("", "-points", "-best") for suffix in ("txt", "csv", "tex")} <= names
-    assert "representative solutions of the front" in said
-
-
-@pytest.mark.slow
 def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_path):
     def stated(least: float) -> Problem:
         problem = glide()
@@ -187,15 +151,10 @@ def test_without_a_feasible_nominal_point_or_its_problem_the_table_says_so(tmp_p
     assert "nothing was simulated: problem 'glide' was stated in a script" in told(one=stated(1.0), three=stated(2.0))
 
 
-def test_nothing_without_a_nominal_problem(folder):
-    assert changed_data(comparisons(Store.open(folder, trust=True), {}), {"nominal": None}) == []
-
-
 @pytest.mark.parametrize(
     ("problems", "nominal", "words"),
     [
         ({"slow": glide(), "fast": glide(4.0)}, "fats", "nominal: unknown problem 'fats', did you mean fast?"),
-        ({"slow": glide(), "fast": glide(4.0)}, ["fast"], "nominal: unknown problem ['fast']"),
         ({"slow": glide()}, "slow", "nominal: 'slow' is the only problem"),
     ],
 )
@@ -205,14 +164,77 @@ def test_wrong_nominal_problems_are_one_line_when_the_study_is_made(problems, no
     assert words in str(error.value) and "\n" not in str(error.value)
 
 
-def test_other_variables_are_told_when_the_study_is_made():
-    other = Problem("glide")
-    phase = other.phase("leg", t0=0.0, tf=(1.0, 5.0))
-    x = phase.state("y", bounds=(0, 20), initial=0, unit="km")
-    phase.dynamics(y=phase.control("u", bounds=(0, 3), unit="km/s"))
-    other.minimize("time", phase.tf, unit="s")
-    other.maximize("distance", phase.final(x), unit="km")
-    problems = {"slow": glide(), "other": other}
-    with pytest.raises(ValueError, match=r"nominal: problem 'other': .* states of phase 'leg' are y, not x") as error:
-        Study("gliders", problems=problems, transcriptions="dfet:2x2", solvers=Plain(), evaluations=40, runs=1, seed=1, nominal="slow")
-    assert "\n" not in str(error.value)
+GIVEN = {"cases": 25, "seed": 4, "density": 0.05}
+
+
+def study(**changed) -> Study:
+    stated = {
+        "problems": ["aerocapture"],
+        "solvers": {"search": {"solver": "nsga2", "population": 12}},
+        "dispersions": GIVEN,
+        "flights": False,
+    }
+    return Study("dispersed", evaluations=240, runs=2, seed=1, **(stated | changed))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few():
+    """Three points of each front."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sensitivity, "DISPERSED_POINTS", 3)
+        yield
+
+
+@pytest.fixture(scope="module")
+def flown_folder(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("dispersed") / "out"
+    study().run(out, executor=Inline())
+    return out
+
+
+@pytest.fixture(scope="module")
+def found(flown_folder) -> DispersedFront:
+    (one,) = dispersed_fronts(comparisons(Store.open(flown_folder), {}), {"dispersions": GIVEN})
+    return one
+
+
+@pytest.mark.slow
+def test_each_point_is_flown_as_the_case_says(found):
+    settings = coupled.Dispersions(**GIVEN)
+    assert found.settings == settings and settings.entry_angle == 0.1
+    again = coupled.dispersed(found.points, settings)
+    for way in ("nominal", "bank as it is", "bank solved anew"):
+        assert [*found.measures[way]] == [one[way].measures() for one in again]
+    nominal = [one["TPS mass fraction, P99", "%"] for one in found.measures["nominal"]]
+    np.testing.assert_allclose(nominal, found.points.objectives[:, 1], rtol=1e-6)
+    assert all(one["captured", "%"] > 90.0 for one in found.measures["bank solved anew"])
+    assert all(0.0 < one["captured", "%"] < 60.0 for one in found.measures["bank as it is"])
+
+
+@pytest.mark.slow
+def test_tables_and_figures_of_the_report(flown_folder, found):
+    made = report(flown_folder)
+    table = next(path for path in made.files if path.name.endswith("dispersed-bank-as-it-is.csv"))
+    rows = list(csv.reader(table.open(encoding="utf-8")))
+    assert len(rows) == 1 + len(found.points) == 4
+    column = next(i for i, name in enumerate(rows[0]) if name.startswith("captured"))
+    assert [float(row[column]) for row in rows[1:]] == [one["captured", "%"] for one in found.measures["bank as it is"]]
+    shield = next(i for i, name in enumerate(rows[0]) if name.startswith("nominal TPS"))
+    np.testing.assert_allclose([float(row[shield]) for row in rows[1:]], found.points.objectives[:, 1])
+    assert any(path.name.endswith("search-dispersed.png") for path in made.files)
+    assert "under dispersions, bank solved anew" in made.text and "seed=4" in made.text
+    assert dispersed_fronts(comparisons(Store.open(flown_folder), {}), {}) == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"problems": ["aerocapture", "welded_beam"]}, "dispersions: problem 'welded_beam': its case does not say"),
+        ({"dispersions": {"wind": 1.0}}, "dispersions: problem 'aerocapture': .*unexpected keyword argument 'wind'"),
+        ({"dispersions": {"cases": 0}}, "cases must be a whole number of at least 1"),
+        ({"dispersions": 3}, "must be a table of settings"),
+    ],
+)
+def test_what_is_refused_before_any_run(changed, words):
+    with pytest.raises(ValueError, match=words):
+        study(**changed)
