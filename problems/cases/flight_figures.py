@@ -33,31 +33,17 @@ def trajectories(flights: Sequence[Any]) -> list[Any]:
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Flights, each with a value that gives it its colour.
+    """Flights, each with a value that gives it its colour."""
 
-    Attributes
-    ----------
-    flights : sequence of sequences of PhaseTrajectory
-        The phases of each flight.
-    values : array (k,)
-    label : str
-        What the values are.
-    """
-
-    flights: Sequence[Sequence[Any]]
+    flights: Sequence[Sequence[Any]]  # The phases of each flight.
     values: np.ndarray
-    label: str
+    label: str  # What the values are.
 
     def over_time(self, along: Sequence[str], units: Mapping[str, tuple[str, float]]) -> Figure:
         """Panels over time: states and controls, commands that have no panel of their own dashed beside what follows them, and limited
         quantities with their limits.
 
-        Parameters
-        ----------
-        along : names
-            Of states and controls.
-        units : mapping
-            Name of a panel -> its unit, and the size of this in that of the quantity; the others are in degrees.
+        `units` has for names of panels their unit, and its size in that of the quantity; the others are in degrees.
         """
         limits = self.flights[0][0].path_limits
         panels = [*along, *(limit.name for limit in limits)]

@@ -71,10 +71,7 @@ def least_effort(x: Any, y: Any) -> Any:
 def reference(landers: int = LANDERS) -> np.ndarray:
     """The true front of some landers. Each of an optimal team is optimal by itself: their fronts are added point by point, and sifted.
 
-    Returns
-    -------
-    array (k, 2)
-        Effort and hazard, in pieces.
+    Effort and hazard (k, 2), in pieces.
     """
     front = alone = single()
     for _ in range(landers - 1):
@@ -87,15 +84,7 @@ def single(rings: int = 4000, angles: int = 2400) -> np.ndarray:
     """The true front of one lander, by a scan of the whole ground: equal effort is a circle, and a site is optimal if no site on the way
     out to its circle is safer.
 
-    Parameters
-    ----------
-    rings, angles : int
-        How many circles, and how many directions are looked at on each before the best one is made exact.
-
-    Returns
-    -------
-    array (k, 2)
-        Effort and hazard, in pieces: one for each hollow that is worth flying to.
+    Effort and hazard (k, 2), in pieces: one for each hollow that is worth flying to.
     """
     center = 0.5 * DURATION * np.array(VELOCITY)
     radius = np.linspace(0.0, np.linalg.norm(np.array(PLAIN) - center) + HOLLOW, rings)

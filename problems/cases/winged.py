@@ -24,36 +24,18 @@ FOOT, SLUG, POUND = 0.3048, 14.59390294, 4.4482216152605
 
 @dataclass(frozen=True)
 class Winged:
-    """A vehicle, the air and the planet.
+    """A vehicle, the air and the planet."""
 
-    Attributes
-    ----------
-    radius, mu : float
-        Of the planet, m; its gravitational parameter, m3/s2.
-    density, scale_height : float
-        Of the air at the surface, kg/m3; height in which it falls by a factor e, m.
-    area : float
-        Of reference, m2.
-    lift, drag : tuple of float or expressions
-        Coefficients of powers of the angle of attack in rad.
-    heating : tuple of float
-        Factors of powers of the angle of attack in degrees.
-    heating_constant : float
-        Heating rate over these, the root of the density in kg/m3, and the speed in m/s to the power 3.07.
-    turning : float
-        Rate at which the planet turns, rad/s; 0: it does not.
-    """
-
-    radius: float
-    mu: float
-    density: float
-    scale_height: float
-    area: float
-    lift: tuple[Any, ...]
+    radius: float  # Of the planet, m.
+    mu: float  # Its gravitational parameter, m3/s2.
+    density: float  # Of the air at the surface, kg/m3.
+    scale_height: float  # Height in which it falls by a factor e, m.
+    area: float  # Of reference, m2.
+    lift: tuple[Any, ...]  # Coefficients of powers of the angle of attack in rad, as of the drag.
     drag: tuple[Any, ...]
-    heating: tuple[float, ...]
-    heating_constant: float
-    turning: float = 0.0
+    heating: tuple[float, ...]  # Factors of powers of the angle of attack in degrees.
+    heating_constant: float  # Heating rate over these, the root of the density in kg/m3, and the speed in m/s to the power 3.07.
+    turning: float = 0.0  # Rate at which the planet turns, rad/s; 0: it does not.
 
     def gravity(self, altitude: Any, model: str = "newtonian") -> Any:
         """Acceleration, m/s2: by Newton's law, or the same everywhere as at sea level."""
@@ -84,26 +66,9 @@ class Winged:
     def rates(
         self, state: Mapping[str, Any], attack: Any, bank: Any, mass: Any, thrust: Any = 0.0, model: str = "newtonian"
     ) -> dict[str, Any]:
-        """Rates of the six states by name.
+        """Rates of the six states by name, per second, of the motion over the ground; angles in rad, the bank to the right, mass in kg.
 
-        Parameters
-        ----------
-        state : mapping
-            "altitude" m, "longitude" and "latitude" rad, "speed" m/s, "flight-path angle" above the horizon and "heading" from north over
-            east, rad; of the motion over the ground.
-        attack, bank : expressions
-            Angle of attack, and bank angle to the right, rad.
-        mass : expression
-            kg.
-        thrust : expression
-            Along the axis of the vehicle, N.
-        model : str
-            Of `GRAVITIES`.
-
-        Returns
-        -------
-        dict
-            Expressions per second, in the order of the states.
+        The flight-path angle is above the horizon, the heading from north over east; thrust, N, is along the axis of the vehicle.
         """
         altitude, latitude, speed = state["altitude"], state["latitude"], state["speed"]
         path, heading = state["flight-path angle"], state["heading"]

@@ -93,11 +93,6 @@ def test_a_period_is_the_width_of_the_bounds(period):
     refused(lambda: bare()[1].control("bank", bounds=(-1, 1), period=period), "bank")
 
 
-def test_a_period_may_differ_from_the_width_by_rounding():
-    bare()[1].control("bank", bounds=(-math.pi, math.pi), period=math.tau)
-    bare()[1].control("bank", bounds=(0.1, 0.3), period=0.2)
-
-
 @pytest.mark.parametrize(
     "limits", [{}, {"lower": 2, "upper": 1}, {"lower": NAN}, {"upper": "3"}, {"upper": INF}, {"lower": ca.MX.sym("q")}], ids=str
 )
@@ -390,11 +385,6 @@ def test_bad_guesses_are_refused(value):
     refused(lambda: glider()[1].guess(height=value), "height", "descent", "guess")
 
 
-@pytest.mark.parametrize("value", [3, np.array(3), [1, 2], np.array([1, 2]), ([0, 1, 2], [5, 4, 3]), (np.arange(3), range(3))], ids=str)
-def test_guesses_of_every_kind_are_taken(value):
-    glider()[1].guess(height=value)
-
-
 def test_guesses_of_unknown_names_and_outside_bounds_are_refused():
     problem, phase = glider()
     problem.parameter("mass", bounds=(1, 2))
@@ -470,16 +460,6 @@ def bare_dynamics(rate):
     _, phase = bare()
     phase.state("height", bounds=(0, 1))
     phase.dynamics(height=rate)
-
-
-def test_symbols_of_another_phase_are_refused_along_a_phase():
-    problem, phase = glider()
-    second = problem.phase("landing", t0=2, tf=3)
-    distance = second.state("distance", bounds=(0, 1))
-    refused(lambda: second.dynamics(distance=phase["height"]), "height", "distance", "landing")
-    refused(lambda: second.path("load", phase.time, upper=1), "time of descent", "landing")
-    refused(lambda: second.integral(phase.tf), "tf of descent", "landing")
-    refused(lambda: phase.peak(distance), "distance", "descent")
 
 
 def test_raw_states_controls_and_time_are_refused_in_objectives_and_constraints():

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
-from math import degrees, radians
 
-import casadi as ca
 import numpy as np
 import pytest
 from moocore import is_nondominated
@@ -20,9 +18,7 @@ from problems.cases.reentry import cases, statement
 from problems.cases.reentry.cases import OPTIMA
 from problems.cases.reentry.statement import MASS, PRESSURE, SHUTTLE
 from runs.measures.references import closed_form, module_of
-from transcription import DFET, MultipleShooting, Trajectory, parse
-from transcription.nlp.scalarized import scalarize
-from transcription.trajectories.simulate import simulate
+from transcription import DFET, MultipleShooting, Trajectory
 
 STATES = ["altitude", "longitude", "latitude", "speed", "flight-path angle", "heading", "angle of attack", "bank angle"]
 CASES = ["reentry_case1", "reentry_case2", "reentry_case3"]
@@ -240,22 +236,6 @@ def test_any_data_make_a_problem(data):
     assert np.isfinite(nlp.evaluate(Z)[1]).all()
 
 
-@pytest.mark.slow
-def test_the_default_mesh_follows_commands_that_jump():
-    """At the end a hundredth of the altitude's span is left open, of which a thousandth counts."""
-    problem = load("reentry_case1")
-    nlp = parse(problem.default_transcription).transcribe(problem)
-    Z = nlp.first_guess(nlp.guess[None])
-    for k in nlp.free:
-        name = nlp.variables[k].name
-        if "bank angle command" in name:
-            element = int(name.split("[")[1].split(",")[0])
-            Z[0, k] += math.radians(15.0 if element % 2 else -15.0)
-    flight = nlp.unpack(nlp.propagate(np.clip(Z, nlp.lower, nlp.upper))[0])
-    found = simulate(nlp.problem, flight, rtol=1e-10, atol=1e-11)
-    assert found.max_defect < 1e-5 and np.degrees(np.abs(np.diff(flight["entry"].controls[:, 1]))).max() > 10.0
-
-
 def test_the_oscillation_is_exact_in_the_search_and_smooth_for_gradients():
     """What stands for the absolute values is what they are, once a candidate is propagated."""
     nlp = DFET(8, 2).transcribe(load("reentry_case1"))
@@ -341,20 +321,8 @@ def test_rows_are_flights_within_the_limits(reference_flights):
         for zone in cases.ZONES:
             apart = np.hypot(np.degrees(states[:, 1]) - zone.longitude, np.degrees(states[:, 2]) - zone.latitude)
             assert (apart >= 0.99 * zone.radius).all()
-
-
-def test_zones_cost_and_narrow_limits_too():
-    """What is best in one objective in the harder case is no better than in the easier one, but for the margins of the solves."""
-    best = {case: (front_of(case)[:, :4] * SIGNS).min(axis=0) for case in LIMITS}
-    assert (best["case2"][:2] >= best["case1"][:2] - [0.1, 1.0]).all()
-    assert (best["case3"][:2] >= best["case1"][:2] - [0.1, 1.0]).all()
-
-
-def test_flights_of_the_reference_pass_south_of_all_zones(reference_flights):
-    case, _, (_, _, states) = reference_flights
-    if case == "case3":
-        for east, north in np.degrees(states[:, 1:3]).transpose(2, 1, 0):
-            assert all(np.interp(zone.longitude, east, north) < zone.latitude for zone in cases.ZONES)
+            for east, north in np.degrees(states[:, 1:3]).transpose(2, 1, 0):
+                assert np.interp(zone.longitude, east, north) < zone.latitude, "all pass south"
 
 
 @pytest.mark.slow
@@ -372,39 +340,6 @@ def test_points_that_the_default_search_calls_verified_are_right():
     assert (worst <= (1 + 1.1e-3) * np.array(LIMITS["case1"])[:, None]).all()
     for k, (target, tolerance) in END.items():
         assert (np.abs(states[-1, k] - target) <= (1 + 1.1e-3) * tolerance).all(), STATES[k]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("passed", "least"), [(0, 6.2), (1, 1.5), (2, 7.9)])
-def test_there_is_no_way_north_of_a_zone(passed, least):
-    """How many degrees farther south a zone would have to lie for a flight to pass north of it, all limits one per cent wider.
-
-    Those before it are passed on the south, as there is no other way, and those behind it are left out.
-    """
-    wider, limits, zone = 1.01, cases.WIDE, cases.ZONES[passed]
-    problem = statement.reentry(
-        "north",
-        statement.Limits(wider * limits.heating_rate, wider * limits.dynamic_pressure, wider * limits.load_factor),
-        [replace(before, radius=before.radius / wider) for before in cases.ZONES[:passed]],
-        altitude_tolerance=wider * 914.4,
-        speed_tolerance=wider * 106.68,
-        angle_tolerance=wider * radians(1.0),
-    )
-    entry, south = problem.phases["entry"], problem.parameter("south", bounds=(0.0, 60.0), scale=1.0)
-    apart = degrees(1.0) * entry["longitude"] - zone.longitude, degrees(1.0) * entry["latitude"] - (zone.latitude - south)
-    entry.path("distance from the zone", ca.hypot(*apart), lower=zone.radius / wider, scale=zone.radius)
-    problem.minimize("south", south)
-    nlp = DFET(60, 2, control_order=1, basis="bernstein").transcribe(problem)
-    found = []
-    for row in front_of("case3")[::30]:
-        laws, candidate = np.radians(row[4:]).reshape(-1, 2), np.full(len(nlp.free), 40.0)
-        for profile, law in zip(nlp.profiles, laws.T, strict=True):
-            candidate[profile.columns] = law
-        start = nlp.propagate(nlp.first_guess(candidate[None]))[0]
-        only = np.append(np.full(4, np.inf), 0.0)
-        solved = scalarize(nlp, start, reference=only, weights=np.eye(5)[4], max_iterations=200)
-        found += [solved.F[4]] if solved.status == "converged" else []
-    assert len(found) >= 3 and min(found) > least
 
 
 @pytest.mark.slow

@@ -117,19 +117,8 @@ def flight(
 ) -> tuple[dict[str, ca.MX], ca.MX]:
     """Add the phase from the hyperbola to the polar orbit to a problem: its states at the end by name, and the heat load, kJ/cm2.
 
-    Parameters
-    ----------
-    problem : Problem
-    lift, drag : numbers or expressions
-        Coefficients times the area, m2.
-    nose : the same
-        Nose radius, m.
-    most : float
-        Greatest heat load, kJ/cm2.
-    declination, bank_rate : float
-        As in `problem`, deg and deg/s.
-    steepest : float
-        Greatest path angle at the exit, rad.
+    `lift` and `drag` are coefficients times the area, m2, `nose` its radius, m; `most` is the greatest heat load, kJ/cm2; `steepest` the
+    greatest path angle at the exit, rad; the others are as in `problem`.
     """
     checks.positive(bank_rate, f"{problem.name}: the bank rate")
     direction = checks.number(declination, f"{problem.name}: the declination")
@@ -247,13 +236,7 @@ SHOWN_UNITS = {
 
 
 def plot(flights: Sequence[Any]) -> dict[str, Figure]:
-    """Both figures by name, states and bank over time, as figures 14 to 17 of the paper, and the ground track, coloured by delta v.
-
-    Parameters
-    ----------
-    flights : Front, Points, Simulations
-        Whatever has a `trajectory`. Of Simulations, the simulated trajectory is drawn; of Points, that of the transcription.
-    """
+    """Both figures by name, states and bank over time, as figures 14 to 17 of the paper, and the ground track, coloured by delta v."""
     phases = [list(trajectory.values()) for trajectory in trajectories(flights)]
     speeds = np.array([float(flight[-1].at(flight[-1].tf)["speed"]) for flight in phases])
     flown = Population(phases, circularisation(speeds), "delta v [m/s]")

@@ -61,31 +61,17 @@ def column(values: Any) -> Any:
 
 @dataclass(frozen=True)
 class Shapes:
-    """Capsules: arrays (n,), or expressions of one; lengths in m, angles in rad.
+    """Capsules: arrays (n,), or expressions of one; lengths in m, angles in rad."""
 
-    Attributes
-    ----------
-    base, nose, rear : ndarray
-        Radii of the largest section, of the sphere and of the back.
-    front_angle : ndarray
-        Half angle of the cone, from the axis.
-    rear_angle : ndarray
-        Angle of the frustum, from the plane of the base.
-    cap, cone, frustum : ndarray
-        Lengths of the three parts along the axis.
-    volume : ndarray
-        m3.
-    """
-
-    base: Any
+    base: Any  # Radius of the largest section, as those of the sphere, `nose`, and of the back, `rear`.
     nose: Any
     rear: Any
-    front_angle: Any
-    rear_angle: Any
-    cap: Any
+    front_angle: Any  # Half angle of the cone, from the axis.
+    rear_angle: Any  # Angle of the frustum, from the plane of the base.
+    cap: Any  # Length along the axis, as those of the other two parts.
     cone: Any
     frustum: Any
-    volume: Any
+    volume: Any  # m3.
 
     @property
     def edge(self) -> Any:
@@ -118,14 +104,7 @@ def faults(
 ) -> np.ndarray:
     """Why rows are no capsules that this model describes: (n,) of text, empty where they are.
 
-    Parameters
-    ----------
-    nose, rear : array_like (n,)
-        Radii of the nose and of the back, over that of the largest section.
-    front_angle, rear_angle : array_like (n,)
-        See `Shapes`, rad.
-    attack : array_like (n,)
-        Angle of attack, rad.
+    Radii of the nose and of the back are over that of the largest section; angles, see `Shapes`, in rad.
     """
     given = np.broadcast_arrays(nose, rear, front_angle, rear_angle, attack)
     nose, rear, front, back, attack = (np.atleast_1d(np.asarray(a, float)) for a in given)
@@ -147,10 +126,7 @@ def faults(
 def capsules(nose: np.ndarray, rear: np.ndarray, front_angle: np.ndarray, rear_angle: np.ndarray, volume: float = VOLUME) -> Shapes:
     """Capsules of a volume, of the same parameters as in `faults`; volumes are closed forms, so the size is, too.
 
-    Raises
-    ------
-    ValueError
-        A row has a fault, or the volume is not positive: the first one is named.
+    Raises ValueError: a row has a fault, or the volume is not positive: the first one is named.
     """
     if not (np.isfinite(volume) and volume > 0.0):
         raise ValueError(f"the volume of a capsule must be positive and finite, not {volume!r}")
@@ -173,16 +149,9 @@ def sized(nose: Any, rear: Any, front_angle: Any, rear_angle: Any, volume: float
 
 
 def lift_and_drag(shapes: Shapes, attack: Any, greatest: float = GREATEST_PRESSURE) -> tuple[Any, Any]:
-    """Coefficients of lift and drag (n,), of the largest section.
+    """Coefficients of lift and drag (n,), of the largest section, of capsules whose rear cones are in the shadow (see `faults`).
 
-    Parameters
-    ----------
-    shapes : Shapes
-        Of n capsules, whose rear cones are in the shadow (`shape.faults`).
-    attack : ndarray (n,)
-        Angle of attack, rad.
-    greatest : float
-        Pressure coefficient at the stagnation point.
+    The angle of attack is in rad; `greatest` is the pressure coefficient at the stagnation point.
     """
     # Not by absolute value and sign, whose derivatives vanish at zero.
     side = choose(attack < 0.0, -1.0, 1.0)

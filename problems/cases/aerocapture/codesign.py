@@ -149,10 +149,7 @@ def corridor_width(ballistic: Any, lift_to_drag: Any) -> Any:
 def boundary(ballistic: np.ndarray, lift: np.ndarray, passage: Passage = PASSAGE) -> np.ndarray:
     """Path angle (n,), rad, at the entry, from which constant lift over drag that points upward (n,) leads to the target orbit.
 
-    Raises
-    ------
-    RuntimeError
-        There is none within `EXIT_ANGLES` for a row.
+    Raises RuntimeError: there is none within `EXIT_ANGLES` for a row.
     """
     ballistic, lift = np.broadcast_arrays(np.asarray(ballistic, float), np.asarray(lift, float))
     low, high = (np.full(lift.shape, angle) for angle in EXIT_ANGLES)

@@ -25,38 +25,19 @@ class JudgedCapsules:
     """What follows from the variables: arrays (n,).
 
     Rows with a reason are no capsules, or none that can be judged; they hold NaN in all other columns.
-
-    Attributes
-    ----------
-    reason : ndarray of str
-        Why a row cannot be judged, or is not captured; empty otherwise.
-    packing : ndarray
-        Inverse packing efficiency, 1/m2.
-    shield : ndarray
-        Heat shield, % of the mass.
-    lift_to_drag, ballistic : ndarray
-        Lift over drag; mass over drag area, kg/m2.
-    length, base : ndarray
-        Of the capsule, and radius of its largest section, m.
-    lift : ndarray
-        Lift over drag that must point upward for the passage; it is captured if this is not larger than `lift_to_drag`.
-    bank : ndarray
-        Angle, rad; where it is not captured, that of all the lift upward or downward.
-    lowest, entry_angle : ndarray
-        Least altitude, m, and path angle at the entry, rad.
     """
 
-    reason: np.ndarray
-    packing: np.ndarray
-    shield: np.ndarray
-    lift_to_drag: np.ndarray
-    ballistic: np.ndarray
-    length: np.ndarray
-    base: np.ndarray
-    lift: np.ndarray
-    bank: np.ndarray
-    lowest: np.ndarray
-    entry_angle: np.ndarray
+    reason: np.ndarray  # Why a row cannot be judged, or is not captured; empty otherwise.
+    packing: np.ndarray  # Inverse packing efficiency, 1/m2.
+    shield: np.ndarray  # Heat shield, % of the mass.
+    lift_to_drag: np.ndarray  # Lift over drag.
+    ballistic: np.ndarray  # Mass over drag area, kg/m2.
+    length: np.ndarray  # Of the capsule, m.
+    base: np.ndarray  # Radius of its largest section, m.
+    lift: np.ndarray  # Lift over drag that must point upward for the passage; it is captured if this is not larger than `lift_to_drag`.
+    bank: np.ndarray  # Angle, rad; where it is not captured, that of all the lift upward or downward.
+    lowest: np.ndarray  # Least altitude, m.
+    entry_angle: np.ndarray  # Path angle at the entry, rad.
 
 
 def shapes_of(X: np.ndarray) -> tuple[Shapes, np.ndarray]:
@@ -74,12 +55,7 @@ def shapes_of(X: np.ndarray) -> tuple[Shapes, np.ndarray]:
 def judged(X: np.ndarray, passage: Passage = PASSAGE, way: Callable[[np.ndarray, Passage], Passages] = tabulated) -> JudgedCapsules:
     """All about rows of the five variables (n, 5), see `BOUNDS`. No row raises an error: those that cannot be judged have a reason.
 
-    Parameters
-    ----------
-    X : ndarray (n, 5)
-    passage : Passage
-    way : callable
-        Passages of ballistic coefficients: `tabulated`, or `passage.passages`, the solver itself.
+    `way` has the passages of ballistic coefficients: `tabulated`, or `passages`, the solver itself.
     """
     X = np.atleast_2d(np.asarray(X, float))
     reason = faults(X[:, 0], X[:, 1], *np.radians(X[:, 2:].T))
@@ -116,41 +92,20 @@ def judged(X: np.ndarray, passage: Passage = PASSAGE, way: Callable[[np.ndarray,
 
 @dataclass(frozen=True)
 class Printed:
-    """A column of Table 2.
+    """A column of Table 2."""
 
-    Attributes
-    ----------
-    shield : float
-        Heat shield, % of the mass.
-    packing : float
-        Inverse packing efficiency, 1/m2.
-    attack, bank : float
-        Angle of attack and bank angle, deg.
-    lift_to_drag : float
-    ballistic : float
-        kg/m2.
-    lowest : float
-        Least altitude, km.
-    entry_angle : float
-        deg.
-    base, nose, rear : float
-        Radii, m.
-    front_angle, rear_angle : float
-        deg.
-    """
-
-    shield: float
-    packing: float
-    attack: float
-    bank: float
+    shield: float  # Heat shield, % of the mass.
+    packing: float  # Inverse packing efficiency, 1/m2.
+    attack: float  # Angle of attack, deg.
+    bank: float  # deg.
     lift_to_drag: float
-    ballistic: float
-    lowest: float
-    entry_angle: float
-    base: float
+    ballistic: float  # kg/m2.
+    lowest: float  # Least altitude, km.
+    entry_angle: float  # deg.
+    base: float  # Radius, m, as the next two.
     nose: float
     rear: float
-    front_angle: float
+    front_angle: float  # deg, as the next one.
     rear_angle: float
 
     @property

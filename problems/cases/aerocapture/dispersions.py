@@ -20,6 +20,7 @@ from math import radians
 from typing import Any
 
 import numpy as np
+from scipy.integrate import RK45
 
 from ... import checks
 from .mars import MARS, Mars, heating_rate, shield_fraction
@@ -42,16 +43,7 @@ TRIALS = 80
 STRIDE = 0.01
 """First change of the lift over drag in that search."""
 
-TABLEAU = (
-    np.array([1 / 5]),
-    np.array([3 / 40, 9 / 40]),
-    np.array([44 / 45, -56 / 15, 32 / 9]),
-    np.array([19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729]),
-    np.array([9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656]),
-    np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]),
-)
-TIMES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
-ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+TABLEAU, TIMES = (*(row[: i + 1] for i, row in enumerate(RK45.A[1:])), RK45.B), (*RK45.C[1:], 1.0)
 
 Lift = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """(rows (k,), times (k,)) -> lift over drag that points upward (k,)."""
@@ -59,29 +51,16 @@ Lift = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Capsule:
-    """A design, and how it flies.
+    """A design, and how it flies."""
 
-    Attributes
-    ----------
-    ballistic, lift_to_drag, nose : float
-        Mass over drag area, kg/m2; lift over drag; nose radius, m.
-    entry_angle : float
-        Path angle at the entry, rad.
-    bank : float or callable
-        Bank angle, rad: constant, or over times (k,) in s since the entry.
-    curved : bool
-        Whether gravity and curvature change with the altitude, as in `winged`, or are those of the interface, as in `passage`.
-    entry_speed : float
-        m/s.
-    """
-
-    ballistic: float
-    lift_to_drag: float
-    nose: float
-    entry_angle: float
-    bank: float | Callable[[np.ndarray], np.ndarray]
+    ballistic: float  # Mass over drag area, kg/m2.
+    lift_to_drag: float  # Lift over drag.
+    nose: float  # Nose radius, m.
+    entry_angle: float  # Path angle at the entry, rad.
+    bank: float | Callable[[np.ndarray], np.ndarray]  # Bank angle, rad: constant, or over times (k,) in s since the entry.
+    # Whether gravity and curvature change with the altitude, as in `winged`, or are those of the interface, as in `passage`.
     curved: bool = False
-    entry_speed: float = PASSAGE.entry_speed
+    entry_speed: float = PASSAGE.entry_speed  # m/s.
 
     def upward(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
         """The lift over drag that points upward, as `Lift`."""
@@ -91,21 +70,11 @@ class Capsule:
 
 @dataclass(frozen=True)
 class Dispersions:
-    """Normal distributions, their standard deviations, and how many cases are drawn.
+    """Normal distributions, their standard deviations, and how many cases are drawn."""
 
-    Attributes
-    ----------
-    entry_angle : float
-        deg.
-    density, ballistic : float
-        Of a factor of the density, and of the ballistic coefficient.
-    cases : int
-    seed : int
-    """
-
-    entry_angle: float = 0.1
-    density: float = 0.1
-    ballistic: float = 0.02
+    entry_angle: float = 0.1  # deg.
+    density: float = 0.1  # Of a factor of the density.
+    ballistic: float = 0.02  # Of a factor of the ballistic coefficient.
     cases: int = 1_000
     seed: int = 0
 
@@ -150,22 +119,12 @@ NOMINAL = Cases(np.zeros(1), np.ones(1), np.ones(1))
 
 @dataclass(frozen=True)
 class Exits:
-    """How cases leave the air: arrays (k,); of those that do not, NaN.
+    """How cases leave the air: arrays (k,); of those that do not, NaN."""
 
-    Attributes
-    ----------
-    speed, path_angle : ndarray
-        m/s and rad, at the interface.
-    heat : ndarray
-        Heat load at the stagnation point of a nose of 1 m, J/cm2.
-    lowest : ndarray
-        Least altitude, m.
-    """
-
-    speed: np.ndarray
-    path_angle: np.ndarray
-    heat: np.ndarray
-    lowest: np.ndarray
+    speed: np.ndarray  # At the interface, m/s.
+    path_angle: np.ndarray  # There, rad.
+    heat: np.ndarray  # Heat load at the stagnation point of a nose of 1 m, J/cm2.
+    lowest: np.ndarray  # Least altitude, m.
 
     def inverse_apoapsis(self, mars: Mars = MARS) -> np.ndarray:
         """Target radius over the apoapsis radius. It is continuous from ellipses to hyperbolas, of which it is negative."""
@@ -177,36 +136,17 @@ class Exits:
 
 @dataclass(frozen=True)
 class DispersedOutcome:
-    """What becomes of cases: arrays (k,).
+    """What becomes of cases: arrays (k,)."""
 
-    Attributes
-    ----------
-    captured : ndarray of bool
-        Whether a case leaves the air on an ellipse whose apoapsis is no farther than `FARTHEST`. Of others, the columns below are NaN.
-    lost : ndarray of bool
-        Whether it does not leave the air.
-    on_target : ndarray of bool
-        Whether its apoapsis is within `ON_TARGET` of the target orbit; None where no bank is solved.
-    apoapsis_error : ndarray
-        Altitude of the apoapsis above the target orbit, km.
-    delta_v : ndarray
-        Of the two burns to the target orbit, m/s: see `two_burns`.
-    shield : ndarray
-        Heat shield that its heat load asks for, % of the mass.
-    lowest : ndarray
-        Least altitude, km.
-    upward : ndarray or None
-        Lift over drag that points upward, where it is solved.
-    """
-
+    # Whether a case leaves the air on an ellipse whose apoapsis is no farther than `FARTHEST`. Of others, the columns below are NaN.
     captured: np.ndarray
-    lost: np.ndarray
-    on_target: np.ndarray | None
-    apoapsis_error: np.ndarray
-    delta_v: np.ndarray
-    shield: np.ndarray
-    lowest: np.ndarray
-    upward: np.ndarray | None = None
+    lost: np.ndarray  # Whether it does not leave the air.
+    on_target: np.ndarray | None  # Whether its apoapsis is within `ON_TARGET` of the target orbit; None where no bank is solved.
+    apoapsis_error: np.ndarray  # Altitude of the apoapsis above the target orbit, km.
+    delta_v: np.ndarray  # Of the two burns to the target orbit, m/s: see `two_burns`.
+    shield: np.ndarray  # Heat shield that its heat load asks for, % of the mass.
+    lowest: np.ndarray  # Least altitude, km.
+    upward: np.ndarray | None = None  # Lift over drag that points upward, where it is solved.
 
     def measures(self) -> dict[tuple[str, str], float | None]:
         """By name and unit: shares of the cases, and of those that are captured the 99th percentile, P99, of what should be small, and
@@ -244,10 +184,7 @@ def solved_anew(capsule: Capsule, cases: Cases) -> DispersedOutcome:
     More lift upward leaves the air earlier and faster, with a higher apoapsis. A case in which all the lift is not enough is flown with all
     of it in the right direction, and is not `on_target`.
 
-    Raises
-    ------
-    RuntimeError
-        A root is not found where there must be one.
+    Raises RuntimeError: a root is not found where there must be one.
     """
     upward = _rooted(capsule, cases)
     return _judged(capsule, flown(capsule, cases, _constant(upward)), upward)
@@ -329,10 +266,7 @@ def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
 def flown(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
     """The way of each case through the air, from the interface until it leaves it or is lost: below `FLOOR`, or too slow to rise again.
 
-    Raises
-    ------
-    RuntimeError
-        A case takes more than `STEPS` steps.
+    Raises RuntimeError: a case takes more than `STEPS` steps.
     """
     k = len(cases)
     motion = _Motion(capsule, MARS.density * cases.density, capsule.ballistic * cases.ballistic, lift)
@@ -406,7 +340,7 @@ class _Motion:
         for weights, share in zip(TABLEAU, TIMES, strict=True):
             ends = states + steps * sum(weight * stage for weight, stage in zip(weights, stages, strict=True) if weight)
             stages.append(self.rates(ends, times + share * steps, rows))
-        error = steps * sum(weight * stage for weight, stage in zip(ERROR, stages, strict=True) if weight)
+        error = steps * sum(weight * stage for weight, stage in zip(RK45.E, stages, strict=True) if weight)
         return ends, stages[-1], np.abs(error / (TOLERANCE * SCALES)).max(axis=0)
 
     def exits(self, level: Sequence[tuple[np.ndarray, ...]], last: Sequence[tuple[np.ndarray, ...]]) -> Exits:

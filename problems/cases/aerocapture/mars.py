@@ -29,29 +29,17 @@ from ..winged import STATES
 
 @dataclass(frozen=True)
 class Mars:
-    """The planet, its air and the two circles that count.
+    """The planet, its air and the two circles that count."""
 
-    Attributes
-    ----------
-    mu : float
-        Gravitational parameter, m3/s2.
-    radius : float
-        Mean radius, m. Fitted: with it an exit at 3500 m/s has the printed path angle and delta v, 1.73 deg and 52.6 m/s, and the circular
-        speed at the target is the printed 3453.7 m/s.
-    interface, target : float
-        Altitudes at which the air begins and of the circular orbit that is wanted, m.
-    scale_height : float
-        Height in which the density falls by a factor e, m. Fitted to altitudes, entry angles and heat shields of Tables 1 and 2.
-    density : float
-        Of the air at the interface, kg/m3. Fitted likewise.
-    """
-
-    mu: float = 4.2828e13
+    mu: float = 4.2828e13  # Gravitational parameter, m3/s2.
+    # Mean radius, m. Fitted: with it an exit at 3500 m/s has the printed path angle and delta v, 1.73 deg and 52.6 m/s, and the circular
+    # speed at the target is the printed 3453.7 m/s.
     radius: float = 3390.7e3
-    interface: float = 100e3
-    target: float = 200e3
+    interface: float = 100e3  # Altitude at which the air begins, m.
+    target: float = 200e3  # Altitude of the circular orbit that is wanted, m.
+    # Height in which the density falls by a factor e, m. Fitted to altitudes, entry angles and heat shields of Tables 1 and 2.
     scale_height: float = 8.92e3
-    density: float = 3.17e-7
+    density: float = 3.17e-7  # Of the air at the interface, kg/m3. Fitted likewise.
 
     @property
     def entry_radius(self) -> float:
@@ -84,10 +72,7 @@ def exit_speeds(mars: Mars = MARS) -> tuple[float, float]:
 def exit_angle(speed: float, mars: Mars = MARS) -> float:
     """Path angle at the interface, rad, that brings the apoapsis to the target orbit: eqs. (13)-(16).
 
-    Raises
-    ------
-    ValueError
-        No angle does, for the speed is outside `exit_speeds`.
+    Raises ValueError: no angle does, for the speed is outside `exit_speeds`.
     """
     least, greatest = exit_speeds(mars)
     if not least <= speed <= greatest:
@@ -105,10 +90,7 @@ def circularisation(speed: Any, mars: Mars = MARS) -> Any:
 def exit_speed(delta_v: float, mars: Mars = MARS) -> float:
     """Speed at the interface, m/s, after which the burn at the target orbit takes a delta v, m/s: `circularisation` solved for it.
 
-    Raises
-    ------
-    ValueError
-        No exit to the target orbit has this delta v.
+    Raises ValueError: no exit to the target orbit has this delta v.
     """
     vertical, level = exit_speeds(mars)
     least, most = float(circularisation(level, mars)), float(np.sqrt(mars.mu / mars.target_radius))
@@ -136,14 +118,6 @@ def arrival(begins: Mapping[str, Any], declination: float, mars: Mars) -> dict[s
 
     The velocity far away is along e / |e|^2 + sqrt(1 - 1 / |e|^2) q, with the eccentricity vector e towards the periapsis, and q a right
     angle ahead of it.
-
-    Parameters
-    ----------
-    begins : mapping
-        States at the entry by the names of `winged.STATES`.
-    declination : float
-        Of the velocity far away, deg; it points to the longitude 0.
-    mars : Mars
     """
     h, lon, lat, v, path, heading = (begins[name] for name in STATES)
     up = ca.vertcat(ca.cos(lat) * ca.cos(lon), ca.cos(lat) * ca.sin(lon), ca.sin(lat))
@@ -194,16 +168,9 @@ SHIELD, SHIELD_POWER = 0.091, 0.51575
 
 
 def heating_rate(density: Any, speed: Any, nose: Any = 1.0, wall_enthalpy: float = WALL_ENTHALPY) -> Any:
-    """Convective heating rate at the stagnation point, W/cm2: eq. (4), with the total enthalpy v^2/2.
+    """Convective heating rate at the stagnation point, W/cm2: eq. (4), with the total enthalpy v^2/2; all in SI.
 
-    Parameters
-    ----------
-    density, speed : numbers, arrays or expressions
-        Of the air, kg/m3, and of the flight, m/s.
-    nose : the same
-        Nose radius, m. That of 1 m gives the rate times the root of the nose radius, which no longer depends on the nose.
-    wall_enthalpy : float
-        J/kg.
+    A nose radius of 1 m gives the rate times the root of the nose radius, which no longer depends on the nose.
     """
     return CONSTANT * (density / nose) ** 0.5 * speed**SPEED_POWER * (1.0 - 2.0 * wall_enthalpy / speed**2)
 

@@ -36,21 +36,12 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Passage:
-    """Statement of the boundary value problem, and the mesh on which it is solved.
-
-    Attributes
-    ----------
-    mars : Mars
-    arrival_speed, exit_speed : float
-        Excess speed of the hyperbola, and speed at which the air is left, m/s.
-    intervals, degree : int
-        Of the collocation.
-    """
+    """Statement of the boundary value problem, and the mesh on which it is solved."""
 
     mars: Mars = MARS
-    arrival_speed: float = ARRIVAL_SPEED
-    exit_speed: float = EXIT_SPEED
-    intervals: int = 8
+    arrival_speed: float = ARRIVAL_SPEED  # Excess speed of the hyperbola, m/s.
+    exit_speed: float = EXIT_SPEED  # Speed at which the air is left, m/s.
+    intervals: int = 8  # Of the collocation, as the degree.
     degree: int = 10
     entry_speed: float = field(init=False)
     exit_angle: float = field(init=False)
@@ -84,42 +75,22 @@ PASSAGE = Passage()
 
 @dataclass(frozen=True)
 class Passages:
-    """What follows from ballistic coefficients: arrays (n,).
+    """What follows from ballistic coefficients: arrays (n,)."""
 
-    Attributes
-    ----------
-    ballistic : ndarray
-        Mass over drag area, kg/m2.
-    lift : ndarray
-        u, the lift over drag that points upward.
-    entry_angle : ndarray
-        Path angle at the entry, rad.
-    lowest : ndarray
-        Least altitude, m.
-    heat : ndarray
-        Heat load at the stagnation point of a nose of 1 m, J/cm2; in general it is this over the root of the nose radius.
-    arc : ndarray
-        Whole arc s, eq. (6).
-    """
-
-    ballistic: np.ndarray
-    lift: np.ndarray
-    entry_angle: np.ndarray
-    lowest: np.ndarray
-    heat: np.ndarray
-    arc: np.ndarray
+    ballistic: np.ndarray  # Mass over drag area, kg/m2.
+    lift: np.ndarray  # u, the lift over drag that points upward.
+    entry_angle: np.ndarray  # Path angle at the entry, rad.
+    lowest: np.ndarray  # Least altitude, m.
+    heat: np.ndarray  # Heat load at the stagnation point of a nose of 1 m, J/cm2; in general it is this over the root of the nose radius.
+    arc: np.ndarray  # Whole arc s, eq. (6).
 
 
 def passages(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
     """The passages of ballistic coefficients (n,), kg/m2.
 
-    Raises
-    ------
-    ValueError
-        One is outside `RANGE`.
-    RuntimeError
-        Newton's method did not converge for one: it is named. It does for all with the paper's data; the nearer the exit is to level, the
-        more lift heavy capsules would need to stay within the atmosphere, far more than they have.
+    Raises ValueError: one is outside `RANGE`. Raises RuntimeError: newton's method did not converge for one: it is named. It does for all
+    with the paper's data; the nearer the exit is to level, the more lift heavy capsules would need to stay within the atmosphere, far more
+    than they have.
     """
     bc = np.atleast_1d(np.asarray(ballistic, float))
     return _measured(bc, *_solved(bc, passage), passage)
@@ -139,10 +110,7 @@ def outside(ballistic: np.ndarray) -> np.ndarray:
 def tabulated(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
     """The passages of ballistic coefficients (n,), kg/m2, from the table; it is made when it is first asked for.
 
-    Raises
-    ------
-    ValueError
-        One is outside the table.
+    Raises ValueError: one is outside the table.
     """
     bc = np.atleast_1d(np.asarray(ballistic, float))
     reasons = outside(bc)

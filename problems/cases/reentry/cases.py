@@ -102,15 +102,7 @@ def _greatest_cross_range(name: str, heating_rate: float | None = None) -> Probl
 
 
 def plot(flights: Sequence[Any], zones: Sequence[Zone] = ()) -> dict[str, Figure]:
-    """States, angles and what the air does over time, and the ground track; the flights coloured by their cross-range.
-
-    Parameters
-    ----------
-    flights : Front, Points, Simulations
-        Whatever has a `trajectory`. Of Simulations, the simulated trajectory is drawn; of Points, that of the transcription.
-    zones : sequence of Zone
-        No-fly zones, on the map.
-    """
+    """States, angles and what the air does over time, and the ground track; the flights coloured by their cross-range."""
     phases = [[trajectory["entry"]] for trajectory in trajectories(flights)]
     flown = Population(phases, np.array([degrees(flight[0]["latitude"][-1]) for flight in phases]), "cross-range [deg]")
     figure, ax = flown.on_the_map()

@@ -203,22 +203,9 @@ def declare(phase: Phase, start: Mapping[str, float], end: Mapping[str, Any]) ->
 def guess(
     phase: Phase, start: Mapping[str, float], until: float, laws: Mapping[str, Sequence[float] | np.ndarray], begin: float = 0.0
 ) -> dict[str, float]:
-    """Make a nominal flight, and the laws that it follows, the guess of a phase, whose dynamics are given: a law, and where it leads.
+    """Make a nominal flight, and the laws that it follows, the guess of a phase with dynamics; the states at its end by name.
 
-    Parameters
-    ----------
-    phase : Phase
-    start : {state: value}
-        At least of those of the phase.
-    until, begin : float
-        Times at which the flight ends and begins, s.
-    laws : {control: values}
-        Of all controls, at equal steps of time, linear between.
-
-    Returns
-    -------
-    dict
-        The states at the end, as they stand in the guess.
+    It begins at `start`, at least of the states of the phase; `laws` are values of all controls at equal steps of time, linear between.
     """
     times = np.linspace(begin, until, 401)
     controls = {name: np.interp(times, np.linspace(begin, until, len(law)), law) for name, law in laws.items()}

@@ -67,51 +67,22 @@ SHOWN_UNITS = {
 
 @dataclass(frozen=True)
 class Mission:
-    """Data of a skip entry.
-
-    Attributes
-    ----------
-    vehicle : Winged
-    lowest : float
-        Altitude at which the descent ends, m.
-    heating : float
-        Limit of the heating rate, Btu/ft2/s, as the vehicle's.
-    impulse : float
-        Specific impulse, s; the flow of propellant is that of the local gravity, as both papers have it.
-    lags : mapping
-        Controls that follow their commands with a lag: gain, 1/s.
-    fastest : float
-        Bound of the speed, m/s.
-    mass : float
-        At the beginning, kg.
-    durations : mapping
-        Bounds of the duration of each phase, s.
-    """
+    """Data of a skip entry."""
 
     vehicle: Winged
-    lowest: float
-    heating: float
-    impulse: float
-    lags: Mapping[str, float]
-    fastest: float = START["speed"]
-    mass: float = START["mass"]
-    durations: Mapping[str, tuple[float, float]] = field(default_factory=lambda: DURATIONS)
+    lowest: float  # Altitude at which the descent ends, m.
+    heating: float  # Limit of the heating rate, Btu/ft2/s, as the vehicle's.
+    impulse: float  # Specific impulse, s; the flow of propellant is that of the local gravity, as both papers have it.
+    lags: Mapping[str, float]  # Controls that follow their commands with a lag: gain, 1/s.
+    fastest: float = START["speed"]  # Bound of the speed, m/s.
+    mass: float = START["mass"]  # At the beginning, kg.
+    durations: Mapping[str, tuple[float, float]] = field(default_factory=lambda: DURATIONS)  # Bounds of the duration of each phase, s.
 
 
 def skip_entry(name: str, mission: Mission) -> tuple[Problem, dict[str, ca.MX]]:
-    """State the flight without objectives.
+    """State the flight, the phases "descent" and "ascent", without objectives; it, and the heating rate by phase.
 
-    Returns
-    -------
-    Problem
-        With the phases "descent" and "ascent".
-    dict
-        The heating rate by phase.
-
-    Raises
-    ------
-    ValueError
-        For data that make no sense, by their names.
+    Raises ValueError for data that make no sense, by their names.
     """
     given = {"impulse": mission.impulse, "mass": mission.mass, "fastest": mission.fastest}
     given |= {f"the lag of the {control}": gain for control, gain in mission.lags.items()}
@@ -161,13 +132,7 @@ def _fly(phase: Phase, mission: Mission, begins: Mapping[str, float], ends: Mapp
 
 
 def plot(flights: Sequence[Any]) -> dict[str, Figure]:
-    """States, controls with their commands and what the air does over time, and the ground track; coloured by flight time.
-
-    Parameters
-    ----------
-    flights : Front, Points, Simulations
-        Whatever has a `trajectory`. Of Simulations, the simulated trajectory is drawn; of Points, that of the transcription.
-    """
+    """States, controls with their commands and what the air does over time, and the ground track; coloured by flight time."""
     phases = [list(trajectory.values()) for trajectory in trajectories(flights)]
     flown = Population(phases, np.array([flight[-1].tf for flight in phases]), "flight time [s]")
     return {"population": flown.over_time(ALONG, SHOWN_UNITS), "ground-track": flown.on_the_map()[0]}

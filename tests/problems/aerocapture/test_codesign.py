@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 import casadi as ca
+import flown_again
 import numpy as np
 import pytest
+from flown_again import CIRCULAR, DENSITY, HEIGHT, MASS, MU, TARGET, TOP
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from truths.two_steps import one_step, two_steps
-from vectors import cross, norm
 
 from macs import MACS, optimize
 from problems import load
@@ -19,10 +20,6 @@ from problems.cases.aerocapture.codesign import BALLISTIC, RATIO, boundary, corr
 from problems.cases.aerocapture.designs import BOUNDS, TABLE_2, judged, shapes_of
 from problems.cases.aerocapture.passage import passages
 from transcription import stated
-
-MU, RADIUS, HEIGHT, DENSITY, MASS = 4.2828e13, 3390.7e3, 8.92e3, 3.17e-7, 946.0
-TOP, TARGET = RADIUS + 100e3, RADIUS + 200e3
-CIRCULAR = np.sqrt(MU / TARGET)
 
 
 def expression() -> ca.Function:
@@ -83,7 +80,7 @@ def exit_apoapsis(entry_angle: float, ballistic: float, lift: float) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("ballistic", "lift"), [(45.0, 0.32), (120.0, 0.49), (300.0, 0.31), (600.0, 0.72)])
+@pytest.mark.parametrize(("ballistic", "lift"), [(45.0, 0.32), (600.0, 0.72)])
 def test_corridors_against_flights_from_the_entry(ballistic, lift):
     def edge(u: float) -> float:
         return brentq(exit_apoapsis, np.radians(-40.0), np.radians(-4.0), args=(ballistic, u), xtol=1e-10)
@@ -115,55 +112,11 @@ def test_capsules_are_within_the_range_of_the_corridor():
 
 
 def confirm(point) -> None:
-    """Raise AssertionError unless a point is flown again as it says, in Cartesian coordinates by other code, with the arrays' kernels."""
+    """Raise AssertionError unless a point is flown again as it says, with the arrays' kernels."""
     design = np.array([[point.parameters[name] for name in NAMES]])
     shapes, attack = shapes_of(design)
     lift, drag = (float(c[0]) * np.pi * float(shapes.base[0]) ** 2 / MASS for c in lift_and_drag(shapes, attack))
-    nose, flight = float(shapes.nose[0]), point.trajectory["atmosphere"]
-    first, end = flight.at(0.0), flight.tf
-    column = [state.name for state in flight.state_variables].index("bank angle")
-    names = ("altitude", "longitude", "latitude", "speed", "flight-path angle", "heading")
-    h, lon, lat, v, path, heading = (float(first[n]) for n in names)
-    up = np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
-    east = np.array([-np.sin(lon), np.cos(lon), 0.0])
-    velocity = v * (np.sin(path) * up + np.cos(path) * (np.sin(heading) * east + np.cos(heading) * np.cross(up, east)))
-    assert v == pytest.approx(np.sqrt(25e6 + 2 * MU / TOP), rel=1e-9)
-
-    def slope(t, y):
-        r, w = y[:3], y[3:6]
-        distance, speed = norm(r), norm(w)
-        rho = DENSITY * math.exp(-(distance - TOP) / HEIGHT)
-        along, right = w / speed, cross(w, r) / norm(cross(w, r))
-        bank = flight.state(np.array(min(t, end)))[column]
-        side = math.cos(bank) * cross(right, along) + math.sin(bank) * right
-        rate = 1.35e-8 * math.sqrt(rho / nose) * speed**3.04 * (1 - 2 * 1.395e6 / speed**2)
-        return [*w, *(0.5 * rho * speed**2 * (lift * side - drag * along) - MU / distance**3 * r), rate]
-
-    def out(t, y):
-        return norm(y[:3]) - TOP if t > 100.0 else -1.0
-
-    out.terminal = True
-    # Where the lift is downward for long, errors grow. The bank angle is smooth between the ends of elements, so steps end there: across
-    # them, flights of one front differ by kilometres at the apoapsis with the step, within elements by metres.
-    settings = {"method": "DOP853", "rtol": 1e-13, "atol": [1e-5] * 3 + [1e-8] * 3 + [1e-3], "max_step": 2.0}
-    y, begun = [*(RADIUS + h) * up, *velocity, 0.0], 0.0
-    for until in [*flight.state.edges[1:-1], end + 60]:
-        flown = solve_ivp(slope, (begun, until), y, events=out, **settings)
-        if flown.status == 1:
-            break
-        y, begun = flown.y[:, -1], until
-    assert flown.status == 1
-    r, v, load = flown.y[:3, -1], flown.y[3:6, -1], flown.y[6, -1]
-    momentum, energy = np.cross(r, v), v @ v / 2 - MU / np.linalg.norm(r)
-    apoapsis = -MU / (2 * energy) * (1 + np.linalg.norm(np.cross(v, momentum) / MU - r / np.linalg.norm(r)))
-    assert apoapsis == pytest.approx(TARGET, abs=500.0)
-    assert np.degrees(np.arccos(momentum[2] / np.linalg.norm(momentum))) == pytest.approx(90.0, abs=0.01)
-    # A flight of least delta v is unstable: it misses the apoapsis a little, by another speed at the exit. For an exit that is nearly level
-    # d(delta v) / d(apoapsis) = h / r_a^2 - r / (r_a dr_a/dv), with dr_a/dv = 4 a^2 v / mu.
-    per_metre = np.linalg.norm(momentum) / apoapsis**2 - np.linalg.norm(r) / apoapsis * energy**2 / (MU * np.linalg.norm(v))
-    burn = point.objectives["delta v"] + per_metre * (apoapsis - TARGET)
-    assert CIRCULAR - np.linalg.norm(momentum) / apoapsis == pytest.approx(burn, abs=0.01)
-    assert 0.091 * load**0.51575 == pytest.approx(point.objectives["TPS mass fraction"], abs=0.002)
+    flown_again.confirm(point, lift, drag, float(shapes.nose[0]))
     size = max(2 * float(shapes.base[0]), float(shapes.length[0])) / 5.0
     # Above it where no objective asks for a compact capsule.
     assert point.objectives["inverse packing efficiency"] > size * (1 - 1e-5)
@@ -232,7 +185,7 @@ def test_every_point_of_a_front_flown_again():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("solution", "share"), [(1, 0.97), (2, 0.96), (5, 0.96)])
+@pytest.mark.parametrize(("solution", "share"), [(1, 0.97), (2, 0.96)])
 def test_the_two_step_design_is_dominated(solution, share):
     """Two steps: a published shape, slender (1) or blunt, then its bank profile with the heat shield of its constant bank. One step is
     better by `share` in each objective; `python tests/truths/two_steps.py` prints by how much."""
