@@ -32,7 +32,7 @@ def trajectories(flights: Sequence[Any]) -> list[Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Population:
+class ColouredFlights:
     """Flights, each with a value that gives it its colour."""
 
     flights: Sequence[Sequence[Any]]  # The phases of each flight.

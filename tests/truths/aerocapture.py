@@ -21,7 +21,7 @@ from macs.pareto.dominance import nondominated
 from problems import load
 from problems.cases.aerocapture import coupled
 from problems.cases.aerocapture.capsule import VOLUME
-from problems.cases.aerocapture.designs import BOUNDS, LENGTH, LIFT_TO_DRAG, judged
+from problems.cases.aerocapture.designs import BOUNDS, LENGTH, LIFT_TO_DRAG, assess
 
 SEEDS = (1, 2, 3)
 STARTS = 3
@@ -44,7 +44,7 @@ def searched(evaluations: int) -> np.ndarray:
 
 def objectives(X: np.ndarray) -> np.ndarray:
     """Inverse packing efficiency and heat shield (k, 2) of rows (k, 5); infinite where a limit is exceeded by more than rounding."""
-    found = judged(X)
+    found = assess(X)
     with np.errstate(invalid="ignore"):
         good = (found.reason == "") & (np.abs(found.lift_to_drag) >= LIFT_TO_DRAG - 1e-9) & (found.length >= LENGTH - 1e-9)
     return np.where(good[:, None], np.stack([found.packing, found.shield], axis=1), np.inf)
@@ -54,17 +54,17 @@ def best_shield(packing: float, starts: Sequence[np.ndarray]) -> list[np.ndarray
     """Variables of least heat shields at an inverse packing efficiency, by sequential quadratic programming from each start."""
     results = []
     for start in starts:
-        side = np.sign(judged(start[None]).lift_to_drag[0])
+        side = np.sign(assess(start[None]).lift_to_drag[0])
 
         def slack(x: np.ndarray, side: float = side) -> np.ndarray:
-            one = judged(x * SPAN)
+            one = assess(x * SPAN)
             room = VOLUME * packing
             return np.array(
                 [room - 2.0 * one.base[0], room - one.length[0], side * one.lift_to_drag[0] - LIFT_TO_DRAG, one.length[0] - LENGTH]
             )
 
         found = minimize(
-            lambda x: judged(x * SPAN).shield[0],
+            lambda x: assess(x * SPAN).shield[0],
             start / SPAN,
             method="SLSQP",
             bounds=[(low / span, high / span) for (low, high), span in zip(BOUNDS, SPAN, strict=True)],

@@ -17,7 +17,7 @@ from macs import Point, optimize
 from macs.decisions import Ranges, ReferencePoint, decide
 from problems import load
 from problems.cases.aerocapture.coupled import PACKING, SHIELD
-from problems.cases.aerocapture.designs import TABLE_2, judged
+from problems.cases.aerocapture.designs import TABLE_2, assess
 from transcription import stated
 
 DELTA_V = "delta v"
@@ -31,7 +31,7 @@ def two_steps(solution: int) -> tuple[dict[str, float], Point]:
     """Objectives of a solution of Table 2 with its best bank profile, and the profile, of which packing is no objective."""
     problem = load("aerocapture_bank", shape=solution)
     profile = optimize(problem, stated(problem.default_transcription), objective=DELTA_V)
-    packing = float(judged(np.array([TABLE_2[solution].design])).packing[0])
+    packing = float(assess(np.array([TABLE_2[solution].design])).packing[0])
     return {PACKING: packing, **{name: profile.objectives[name] for name in (SHIELD, DELTA_V)}}, profile
 
 

@@ -20,10 +20,10 @@ import numpy as np
 
 from ... import checks
 from ...problem import Problem
-from ..flight_figures import Population, track, trajectories
+from ..flight_figures import ColouredFlights, track, trajectories
 from ..winged import STATES, UNITS, Winged
 from .capsule import MASS, lift_and_drag
-from .designs import TABLE_2, JudgedCapsules, judged, shapes_of
+from .designs import TABLE_2, JudgedCapsules, assess, shapes_of
 from .dispersions import Capsule, DispersedOutcome, Dispersions, outcomes
 from .mars import EXIT_SPEED, MARS, allowed_load, apoapsis, arrival, circularisation, heating_rate, shield_fraction, since_arrival
 from .passage import PASSAGE, profile
@@ -89,7 +89,7 @@ def problem(
         For a shape that is no capsule or cannot be captured, and data that make no sense.
     """
     design = _design(shape)
-    planar = judged(design)
+    planar = assess(design)
     limit = float(planar.shield[0]) if shield == OWN else checks.positive(shield, "aerocapture_bank: the heat shield")
     lift, drag, nose = _capsule(design)
     most = 1e-3 * float(allowed_load(limit))
@@ -161,7 +161,7 @@ def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, DispersedO
     """What becomes of each point of a front under dispersions, with its bank profile over time, whose last value stays, and with a constant
     bank solved anew for each case."""
     design = _design(front.source.data.get("shape", SHAPE))
-    found, nose = judged(design), float(shapes_of(design)[0].nose[0])
+    found, nose = assess(design), float(shapes_of(design)[0].nose[0])
     ballistic, ratio = float(found.ballistic[0]), float(found.lift_to_drag[0])
     flights = [next(iter(point.trajectory.values())) for point in front]
     entries = [float(flight.at(flight.t0)["flight-path angle"]) for flight in flights]
@@ -188,7 +188,7 @@ def _design(shape: int | Sequence[float]) -> np.ndarray:
     if len(values) != 5:
         raise ValueError(f"aerocapture_bank: a shape has five variables, not {len(values)}")
     design = np.array([values])
-    reason = judged(design).reason[0]
+    reason = assess(design).reason[0]
     if reason:
         raise ValueError(f"aerocapture_bank: the shape {shape}: {reason}")
     return design
@@ -239,5 +239,5 @@ def plot(flights: Sequence[Any]) -> dict[str, Figure]:
     """Both figures by name, states and bank over time, as figures 14 to 17 of the paper, and the ground track, coloured by delta v."""
     phases = [list(trajectory.values()) for trajectory in trajectories(flights)]
     speeds = np.array([float(flight[-1].at(flight[-1].tf)["speed"]) for flight in phases])
-    flown = Population(phases, circularisation(speeds), "delta v [m/s]")
+    flown = ColouredFlights(phases, circularisation(speeds), "delta v [m/s]")
     return {"population": flown.over_time(ALONG, SHOWN_UNITS), "ground-track": flown.on_the_map()[0]}

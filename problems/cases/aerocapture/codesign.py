@@ -38,7 +38,7 @@ from ..flight_figures import track
 from .bank import BANK_RATE, DECLINATION, STEEPEST, TRANSCRIPTION, flight, guess, plot
 from .capsule import VOLUME, ballistic_coefficient, lift_and_drag, log, sized
 from .coupled import PACKING, SHIELD, VARIABLES
-from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, TABLE_2, judged
+from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, TABLE_2, assess
 from .mars import MARS, circularisation, exit_angle, exit_speed, shield_fraction
 from .passage import PASSAGE, Passage, slopes
 
@@ -113,8 +113,8 @@ def problem(
         problem.constraint("ballistic coefficient", ballistic, lower=BALLISTIC[0], upper=BALLISTIC[1], unit="kg/m2")
         problem.maximize(CORRIDOR, corridor_width(ballistic, lift / drag), unit="deg")
     design = np.array([TABLE_2[shape or STATED].design])
-    design[:, -1] *= np.sign(judged(design).lift_to_drag)
-    start = judged(design)
+    design[:, -1] *= np.sign(assess(design).lift_to_drag)
+    start = assess(design)
     if shape is not None:
         problem.guess(**dict(zip((name for name, _ in VARIABLES), map(float, design[0]), strict=True)))
         problem.guess(**{SIZE: float(start.packing[0]) * VOLUME})

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...vector import VectorProblem
-from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, judged, shapes_of
+from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, assess, shapes_of
 from .dispersions import Capsule, DispersedOutcome, Dispersions, outcomes
 from .mars import ARRIVAL_SPEED, EXIT_SPEED, exit_speeds
 from .passage import PASSAGE, Passage
@@ -54,7 +54,7 @@ def problem(*, arrival_speed: float = ARRIVAL_SPEED, exit_speed: float = EXIT_SP
 
     @problem.function
     def evaluate(X: np.ndarray) -> dict[str, np.ndarray]:
-        found = judged(X, passage)
+        found = assess(X, passage)
         ratio = np.abs(found.lift_to_drag)
         return {
             PACKING: found.packing,
@@ -94,7 +94,7 @@ def _passage(arrival_speed: float = ARRIVAL_SPEED, exit_speed: float = EXIT_SPEE
 def dispersed(front: Any, dispersions: Dispersions) -> list[dict[str, DispersedOutcome]]:
     """What becomes of each point of a front under dispersions, with its constant bank and with one solved anew for each case."""
     X, passage = np.array([np.asarray(row) for row in front.decision]), _passage(**front.source.data)
-    found, (shapes, _) = judged(X, passage), shapes_of(X)
+    found, (shapes, _) = assess(X, passage), shapes_of(X)
     columns = found.ballistic, found.lift_to_drag, shapes.nose, found.entry_angle, found.bank
     capsules = [
         Capsule(ballistic, ratio, nose, angle, bank, entry_speed=passage.entry_speed)

@@ -52,7 +52,7 @@ def shapes_of(X: np.ndarray) -> tuple[Shapes, np.ndarray]:
     return capsules(nose, rear, front, back), attack
 
 
-def judged(X: np.ndarray, passage: Passage = PASSAGE, way: Callable[[np.ndarray, Passage], Passages] = tabulated) -> JudgedCapsules:
+def assess(X: np.ndarray, passage: Passage = PASSAGE, way: Callable[[np.ndarray, Passage], Passages] = tabulated) -> JudgedCapsules:
     """All about rows of the five variables (n, 5), see `BOUNDS`. No row raises an error: those that cannot be judged have a reason.
 
     `way` has the passages of ballistic coefficients: `tabulated`, or `passages`, the solver itself.
@@ -131,7 +131,7 @@ TABLE_3 = {2: (40.85, -9.16, 7.98, 39.22), 3: (44.8, -9.38, 7.05, 38.25)}
 
 def table_2() -> str:
     """Table 2 beside ours: for each solution the printed figures, then what follows here from its five variables."""
-    found = judged(np.array([solution.design for solution in TABLE_2.values()]), way=passages)
+    found = assess(np.array([solution.design for solution in TABLE_2.values()]), way=passages)
     bank, entry = np.degrees(found.bank), np.degrees(found.entry_angle)
     ours = (found.shield, found.packing, found.lift_to_drag, bank, found.ballistic, found.lowest / 1e3, entry, found.base)
     heads = ("solution", "by", "TPS %", "eta 1/m2", "L/D", "bank deg", "BC kg/m2", "h_min km", "gamma_e deg", "r_b m")

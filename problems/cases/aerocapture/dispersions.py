@@ -167,18 +167,18 @@ class DispersedOutcome:
 
 
 def outcomes(capsules: Sequence[Capsule], dispersions: Dispersions) -> list[dict[str, DispersedOutcome]]:
-    """Of each capsule the nominal case alone, and all cases in both ways: `as_it_is` and `solved_anew`."""
+    """Of each capsule the nominal case alone, and all cases in both ways: `with_same_bank` and `with_solved_bank`."""
     cases = dispersions.draw()
-    ways = {"nominal": (as_it_is, NOMINAL), "bank as it is": (as_it_is, cases), "bank solved anew": (solved_anew, cases)}
+    ways = {"nominal": (with_same_bank, NOMINAL), "bank as it is": (with_same_bank, cases), "bank solved anew": (with_solved_bank, cases)}
     return [{name: way(capsule, some) for name, (way, some) in ways.items()} for capsule in capsules]
 
 
-def as_it_is(capsule: Capsule, cases: Cases) -> DispersedOutcome:
+def with_same_bank(capsule: Capsule, cases: Cases) -> DispersedOutcome:
     """The cases with the bank angle of the nominal one, or its profile over time."""
-    return _judged(capsule, flown(capsule, cases, capsule.upward))
+    return _outcome(capsule, fly(capsule, cases, capsule.upward))
 
 
-def solved_anew(capsule: Capsule, cases: Cases) -> DispersedOutcome:
+def with_solved_bank(capsule: Capsule, cases: Cases) -> DispersedOutcome:
     """The cases, each with the constant bank angle that brings its apoapsis to the target orbit.
 
     More lift upward leaves the air earlier and faster, with a higher apoapsis. A case in which all the lift is not enough is flown with all
@@ -186,8 +186,8 @@ def solved_anew(capsule: Capsule, cases: Cases) -> DispersedOutcome:
 
     Raises RuntimeError: a root is not found where there must be one.
     """
-    upward = _rooted(capsule, cases)
-    return _judged(capsule, flown(capsule, cases, _constant(upward)), upward)
+    upward = _solved_lift(capsule, cases)
+    return _outcome(capsule, fly(capsule, cases, _constant(upward)), upward)
 
 
 def two_burns(speed: np.ndarray, path_angle: np.ndarray, mars: Mars = MARS) -> np.ndarray:
@@ -205,7 +205,7 @@ def two_burns(speed: np.ndarray, path_angle: np.ndarray, mars: Mars = MARS) -> n
     return np.asarray(first + np.abs(np.sqrt(2.0 * mars.mu * apoapsis / (goal * between)) - np.sqrt(mars.mu / goal)))
 
 
-def _judged(capsule: Capsule, exits: Exits, upward: np.ndarray | None = None) -> DispersedOutcome:
+def _outcome(capsule: Capsule, exits: Exits, upward: np.ndarray | None = None) -> DispersedOutcome:
     inverse = exits.inverse_apoapsis()
     goal = MARS.target_radius
     # False for NaN, too.
@@ -224,7 +224,7 @@ def _constant(upward: np.ndarray) -> Lift:
     return lambda rows, times: upward[rows]
 
 
-def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
+def _solved_lift(capsule: Capsule, cases: Cases) -> np.ndarray:
     """The lift over drag (k,) with which each case's apoapsis is on the target orbit, or the limit beyond which it would be.
 
     From the nominal one outward in strides that double until the root is between two, then by regula falsi in the Illinois form, or by
@@ -239,7 +239,7 @@ def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
     (active,) = _only(slice(None), np.arange(k))
     for _ in range(TRIALS):
         trial = upward[active]
-        excess = flown(capsule, cases[active], _constant(trial)).inverse_apoapsis() - 1.0
+        excess = fly(capsule, cases[active], _constant(trial)).inverse_apoapsis() - 1.0
         excess = np.where(np.isnan(excess), np.inf, excess)
         under = excess > 0.0
         done = (np.abs(excess) <= near) | (under & (trial >= most)) | (~under & (trial <= -most))
@@ -263,7 +263,7 @@ def _rooted(capsule: Capsule, cases: Cases) -> np.ndarray:
     raise RuntimeError(f"no constant bank found in {TRIALS} flights for {len(active)} of {k} cases")
 
 
-def flown(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
+def fly(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
     """The way of each case through the air, from the interface until it leaves it or is lost: below `FLOOR`, or too slow to rise again.
 
     Raises RuntimeError: a case takes more than `STEPS` steps.

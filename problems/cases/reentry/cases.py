@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...problem import Problem
-from ..flight_figures import RED, Population, track, trajectories
+from ..flight_figures import RED, ColouredFlights, track, trajectories
 from ..winged import STATES
 from .statement import ANGLES, ATTACK, BANK, END, MASS, SHUTTLE, START, Limits, Zone, declare, guess, known, reentry
 
@@ -104,7 +104,7 @@ def _greatest_cross_range(name: str, heating_rate: float | None = None) -> Probl
 def plot(flights: Sequence[Any], zones: Sequence[Zone] = ()) -> dict[str, Figure]:
     """States, angles and what the air does over time, and the ground track; the flights coloured by their cross-range."""
     phases = [[trajectory["entry"]] for trajectory in trajectories(flights)]
-    flown = Population(phases, np.array([degrees(flight[0]["latitude"][-1]) for flight in phases]), "cross-range [deg]")
+    flown = ColouredFlights(phases, np.array([degrees(flight[0]["latitude"][-1]) for flight in phases]), "cross-range [deg]")
     figure, ax = flown.on_the_map()
     around = np.linspace(0.0, 2 * np.pi, 181)
     for zone in zones:

@@ -17,7 +17,7 @@ import numpy as np
 from ... import checks
 from ...phase import Phase
 from ...problem import Problem
-from ..flight_figures import Population, trajectories
+from ..flight_figures import ColouredFlights, trajectories
 from ..winged import STATES, UNITS, Winged
 
 if TYPE_CHECKING:
@@ -134,5 +134,5 @@ def _fly(phase: Phase, mission: Mission, begins: Mapping[str, float], ends: Mapp
 def plot(flights: Sequence[Any]) -> dict[str, Figure]:
     """States, controls with their commands and what the air does over time, and the ground track; coloured by flight time."""
     phases = [list(trajectory.values()) for trajectory in trajectories(flights)]
-    flown = Population(phases, np.array([flight[-1].tf for flight in phases]), "flight time [s]")
+    flown = ColouredFlights(phases, np.array([flight[-1].tf for flight in phases]), "flight time [s]")
     return {"population": flown.over_time(ALONG, SHOWN_UNITS), "ground-track": flown.on_the_map()[0]}

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from macs import optimize, sweep
 from problems import load
 from problems.cases.aerocapture.capsule import MASS, lift_and_drag
-from problems.cases.aerocapture.designs import TABLE_2, TABLE_3, judged, shapes_of
+from problems.cases.aerocapture.designs import TABLE_2, TABLE_3, assess, shapes_of
 from transcription import stated
 
 ASKED = {2: (37.0, 8.99), 3: (37.2, 7.88)}
@@ -169,6 +169,6 @@ def test_the_whole_trade():
     """Without a transcription: every point verified, the ends those of the single optimum and of the steepest exit."""
     front = sweep(load("aerocapture_bank"), points=8, starts=1)
     assert front.verified.all() and len(front) >= 7
-    assert front.objectives[0] == pytest.approx([36.815, judged(np.array([TABLE_2[2].design])).shield[0]], abs=0.01)
+    assert front.objectives[0] == pytest.approx([36.815, assess(np.array([TABLE_2[2].design])).shield[0]], abs=0.01)
     assert front.objectives[-1, 1] < 7.2
     confirm(front[len(front) // 2], *capsule(2))

@@ -10,7 +10,7 @@ from macs import MACS, MOPSO
 from problems import load
 from problems.cases.aerocapture.capsule import ballistic_coefficient, capsules, faults, lift_and_drag
 from problems.cases.aerocapture.coupled import reference, reference_designs
-from problems.cases.aerocapture.designs import BOUNDS, LENGTH, LIFT_TO_DRAG, TABLE_2, judged, shapes_of
+from problems.cases.aerocapture.designs import BOUNDS, LENGTH, LIFT_TO_DRAG, TABLE_2, assess, shapes_of
 from problems.cases.aerocapture.passage import passages
 from runs.measures.indicators import hypervolume_at
 
@@ -143,7 +143,7 @@ STEP = 1e-3 * np.ptp(reference()[:, 1])
 
 
 def feasible(X: np.ndarray, allowed: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    found = judged(X)
+    found = assess(X)
     good = (found.reason == "") & (np.abs(found.lift_to_drag) >= LIFT_TO_DRAG - allowed) & (found.length >= LENGTH - allowed)
     return np.stack([found.packing, found.shield], axis=1), good
 
@@ -153,7 +153,7 @@ def test_the_reference_is_a_front_of_the_problem_and_has_a_jump() -> None:
     F, good = feasible(rows[:, 2:], 1e-7)
     assert good.all()
     np.testing.assert_allclose(F, rows[:, :2], rtol=2e-7)
-    exact = judged(rows[::50, 2:], way=passages)
+    exact = assess(rows[::50, 2:], way=passages)
     np.testing.assert_allclose(exact.shield, rows[::50, 1], rtol=1e-6)
     assert (np.diff(rows[:, 0]) > 0).all() and (np.diff(rows[:, 1]) < 0).all()
     # Slender capsules, then blunt ones: between them the heat shield falls at once.

@@ -17,7 +17,7 @@ from macs import MACS, optimize
 from problems import load
 from problems.cases.aerocapture.capsule import lift_and_drag, sized
 from problems.cases.aerocapture.codesign import BALLISTIC, RATIO, boundary, corridor_width
-from problems.cases.aerocapture.designs import BOUNDS, TABLE_2, judged, shapes_of
+from problems.cases.aerocapture.designs import BOUNDS, TABLE_2, assess, shapes_of
 from problems.cases.aerocapture.passage import passages
 from transcription import stated
 
@@ -105,7 +105,7 @@ def test_corridors_all_over_the_range():
 
 
 def test_capsules_are_within_the_range_of_the_corridor():
-    found = judged(np.random.default_rng(9).uniform(*np.array(BOUNDS).T, (20_000, 5)))
+    found = assess(np.random.default_rng(9).uniform(*np.array(BOUNDS).T, (20_000, 5)))
     good = (np.abs(found.lift_to_drag) >= 0.3) & (found.length >= 0.8)
     assert found.ballistic[good].min() > BALLISTIC[0] and found.ballistic[good].max() < BALLISTIC[1]
     assert np.abs(found.lift_to_drag[good]).max() < RATIO[1]
@@ -133,7 +133,7 @@ def test_single_optima_flown_again(objective):
     point = optimize(problem, stated(problem.default_transcription), objective=objective, starts=1)
     assert point.status == "converged" and point.verified
     confirm(point)
-    start = judged(np.array([TABLE_2[2].design]))
+    start = assess(np.array([TABLE_2[2].design]))
     assert point.objectives[objective] < float((start.packing if objective == "inverse packing efficiency" else start.shield)[0])
 
 
@@ -169,7 +169,7 @@ def test_the_corridor_is_a_fourth_objective():
     problem = load("aerocapture_codesign", shape=2, corridor=True)
     point = optimize(problem, stated(problem.default_transcription), objective="entry corridor", starts=1)
     assert point.verified
-    found = judged(np.array([[point.parameters[name] for name in NAMES]]))
+    found = assess(np.array([[point.parameters[name] for name in NAMES]]))
     ballistic, ratio = float(found.ballistic[0]), float(found.lift_to_drag[0])
     angles = np.degrees(boundary(np.full(2, ballistic), np.array([-ratio, ratio])))
     assert point.objectives["entry corridor"] == pytest.approx(angles[0] - angles[1], abs=2e-3)
@@ -191,7 +191,7 @@ def test_the_two_step_design_is_dominated(solution, share):
     better by `share` in each objective; `python tests/truths/two_steps.py` prints by how much."""
     beside, profile = two_steps(solution)
     assert profile.status == "converged" and profile.verified
-    assert beside["TPS mass fraction"] <= judged(np.array([TABLE_2[solution].design])).shield[0] * (1 + 1e-5)
+    assert beside["TPS mass fraction"] <= assess(np.array([TABLE_2[solution].design])).shield[0] * (1 + 1e-5)
     chosen = one_step(solution, beside)
     assert chosen.verified
     confirm(chosen)

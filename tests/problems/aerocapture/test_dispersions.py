@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 from macs import payoff
 from problems import load
 from problems.cases.aerocapture import bank
-from problems.cases.aerocapture.designs import TABLE_2, judged, shapes_of
-from problems.cases.aerocapture.dispersions import NOMINAL, Capsule, Cases, Dispersions, as_it_is, flown, solved_anew, two_burns
+from problems.cases.aerocapture.designs import TABLE_2, assess, shapes_of
+from problems.cases.aerocapture.dispersions import NOMINAL, Capsule, Cases, Dispersions, fly, two_burns, with_same_bank, with_solved_bank
 from problems.cases.aerocapture.mars import MARS, circularisation, exit_angle
 from transcription import stated
 
@@ -28,7 +28,7 @@ RTOL = 1e-6
 def capsule(number: int) -> Capsule:
     """A solution of Table 2 with its constant bank."""
     X = np.array([TABLE_2[number].design])
-    found, nose = judged(X), shapes_of(X)[0].nose
+    found, nose = assess(X), shapes_of(X)[0].nose
     return Capsule(*(float(c[0]) for c in (found.ballistic, found.lift_to_drag, nose, found.entry_angle, found.bank)))
 
 
@@ -88,14 +88,14 @@ def upward_of(design: Capsule):
 @pytest.mark.parametrize("number", TABLE_2)
 def test_without_dispersion_it_is_the_nominal_passage(number):
     """The passage is solved by collocation from the exit back to the entry; this is flown forward."""
-    design, nominal = capsule(number), judged(np.array([TABLE_2[number].design]))
-    found = as_it_is(design, NOMINAL)
+    design, nominal = capsule(number), assess(np.array([TABLE_2[number].design]))
+    found = with_same_bank(design, NOMINAL)
     assert found.captured[0] and not found.lost[0]
     assert found.apoapsis_error[0] == pytest.approx(0.0, abs=1e-3)
     assert found.delta_v[0] == pytest.approx(circularisation(3500.0), rel=RTOL)
     assert found.shield[0] == pytest.approx(nominal.shield[0], rel=RTOL)
     assert found.lowest[0] == pytest.approx(nominal.lowest[0] / 1e3, rel=RTOL)
-    anew = solved_anew(design, NOMINAL)
+    anew = with_solved_bank(design, NOMINAL)
     assert anew.on_target[0]
     assert anew.upward[0] == pytest.approx(nominal.lift[0], abs=RTOL)
 
@@ -105,7 +105,7 @@ def test_without_dispersion_it_is_the_nominal_passage(number):
 def test_cases_flown_by_other_code(design):
     """Those that come out, captured or not, to 1e-6; and nothing else is captured or lost."""
     cases = Dispersions(cases=14, seed=5).draw()
-    exits, outcome = flown(design, cases, design.upward), as_it_is(design, cases)
+    exits, outcome = fly(design, cases, design.upward), with_same_bank(design, cases)
     met = set()
     for row in range(len(cases)):
         end, least = over_a_plain(design, upward_of(design), cases, row)
@@ -142,7 +142,7 @@ def test_the_farthest_apoapsis_that_counts():
     limit = brentq(lambda u: above(u) - 1e3 / (RADIUS + 10_000e3), start, start + 0.06, xtol=1e-10)
     for upward, inside in ((limit - 1e-6, True), (limit + 1e-6, False), (limit + 0.05, False), (0.3, False)):
         flight = Capsule(design.ballistic, 1.0, design.nose, design.entry_angle, np.arccos(upward))
-        found = as_it_is(flight, NOMINAL)
+        found = with_same_bank(flight, NOMINAL)
         assert found.captured[0] == inside and not found.lost[0]
     assert found.measures()["delta v, P99", "m/s"] is None
 
@@ -153,7 +153,7 @@ def test_not_enough_lift_is_flown_with_all_of_it():
     most = abs(capsule(2).lift_to_drag * np.cos(capsule(2).bank)) + 0.01
     weak = Capsule(capsule(2).ballistic, -most, 1.0, capsule(2).entry_angle, 0.0)
     cases = Cases(np.radians([-2.0, 0.0, 0.5, 0.05]), np.ones(4), np.ones(4))
-    found = solved_anew(weak, cases)
+    found = with_solved_bank(weak, cases)
     assert found.upward[[0, 2, 3]].tolist() == [most, -most, -most]
     assert found.on_target.tolist() == [False, True, False, False]
     assert found.captured.tolist() == [False, True, False, True]
@@ -167,7 +167,7 @@ def test_density_and_ballistic_coefficient_together_change_only_the_heat(factor,
     """The motion depends on their ratio; the heating rate goes with the root of the density."""
     design = capsule(number)
     tilt, one = np.full(2, np.radians(angle)), np.array([1.0, factor])
-    exits = flown(design, Cases(tilt, one, one), lambda rows, _: np.full(len(rows), 0.1))
+    exits = fly(design, Cases(tilt, one, one), lambda rows, _: np.full(len(rows), 0.1))
     np.testing.assert_allclose(exits.speed[1], exits.speed[0], rtol=1e-7)
     np.testing.assert_allclose(exits.lowest[1], exits.lowest[0], rtol=1e-7)
     np.testing.assert_allclose(exits.heat[1], np.sqrt(factor) * exits.heat[0], rtol=1e-7)
@@ -195,9 +195,9 @@ def test_the_same_seed_gives_the_same_bits():
     assert cases.entry_angle.tobytes() == again.entry_angle.tobytes()
     assert cases.density.tobytes() != Dispersions(cases=200, seed=8).draw().density.tobytes()
     design, some = capsule(2), np.arange(3, 200, 7)
-    whole, part = as_it_is(design, cases), as_it_is(design, cases[some])
+    whole, part = with_same_bank(design, cases), with_same_bank(design, cases[some])
     assert whole.apoapsis_error[some].tobytes() == part.apoapsis_error.tobytes()
-    assert solved_anew(design, cases).upward.tobytes() == solved_anew(design, again).upward.tobytes()
+    assert with_solved_bank(design, cases).upward.tobytes() == with_solved_bank(design, again).upward.tobytes()
 
 
 def test_draws_are_normal():

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from problems.cases.aerocapture import mars
-from problems.cases.aerocapture.designs import BOUNDS, TABLE_1, TABLE_2, JudgedCapsules, judged
+from problems.cases.aerocapture.designs import BOUNDS, TABLE_1, TABLE_2, JudgedCapsules, assess
 from problems.cases.aerocapture.mars import allowed_load, heating_rate, shield_fraction
 from problems.cases.aerocapture.passage import COLUMNS, PASSAGE, RANGE, Passage, outside, passages, tabulated
 
@@ -127,7 +127,7 @@ def test_capture_by_a_burn():
     assert mars.propellant_fraction(mars.capture_by_burn()) == pytest.approx(0.594, abs=5e-4)
 
 
-SOLUTIONS = judged(np.array([p.design for p in TABLE_2.values()]))
+SOLUTIONS = assess(np.array([p.design for p in TABLE_2.values()]))
 
 
 @pytest.mark.parametrize("passage", [Passage(), Passage(arrival_speed=4200.0, exit_speed=3480.0)])
@@ -173,10 +173,10 @@ def test_table_1():
 
 def test_what_cannot_be_judged_has_a_reason_and_disturbs_no_other_row():
     X = np.array([TABLE_2[2].design, (-1.0, 0.3, 50.0, 30.0, 10.0), (0.5, 0.4, 50.0, 70.0, 25.0), TABLE_2[3].design])
-    found = judged(X)
+    found = assess(X)
     assert [bool(reason) for reason in found.reason] == [False, True, True, False]
     np.testing.assert_array_equal(found.shield[[0, 3]], SOLUTIONS.shield[[1, 2]])
-    flat = judged(np.array([(0.9, 0.2, 70.0, 5.0, 0.0)]))
+    flat = assess(np.array([(0.9, 0.2, 70.0, 5.0, 0.0)]))
     assert "more lift than there is" in flat.reason[0]
     assert all(np.isfinite(getattr(flat, f.name)).all() for f in fields(JudgedCapsules) if f.name != "reason")
 
@@ -184,14 +184,14 @@ def test_what_cannot_be_judged_has_a_reason_and_disturbs_no_other_row():
 def test_all_of_the_box_is_in_the_table():
     X = np.random.default_rng(2).uniform(*np.array(BOUNDS).T, (3000, 5))
     corners = np.array(np.meshgrid(*BOUNDS)).reshape(5, -1).T
-    found = judged(np.vstack([X, corners]))
+    found = assess(np.vstack([X, corners]))
     assert np.isfinite(found.shield).all()
     assert not any("table" in reason for reason in found.reason)
 
 
 def test_the_angle_of_attack_has_a_mirror_image():
     X = np.array([p.design for p in TABLE_2.values()])
-    mirrored = judged(X * [1, 1, 1, 1, -1])
+    mirrored = assess(X * [1, 1, 1, 1, -1])
     np.testing.assert_allclose(mirrored.lift_to_drag, -SOLUTIONS.lift_to_drag)
     np.testing.assert_allclose(mirrored.bank, np.pi - SOLUTIONS.bank)
     np.testing.assert_allclose(mirrored.shield, SOLUTIONS.shield)
