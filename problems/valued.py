@@ -227,16 +227,9 @@ def _with_parameters(phase: CompiledPhase, own: int, more: int) -> CompiledPhase
         value = function.call([x, u, t, s[: 2 + own]], True, False)
         return ca.Function(function.name(), [x, u, t, s], value, function.name_in(), function.name_out())
 
-    return replace(
-        phase,
-        dynamics=widened(phase.dynamics),
-        path=widened(phase.path),
-        initials=widened(phase.initials),
-        finals=widened(phase.finals),
-        integrands=widened(phase.integrands),
-        peaks=widened(phase.peaks),
-        sizes=widened(phase.sizes),
-    )
+    names = ("dynamics", "path", "initials", "finals", "integrands", "peaks", "sizes")
+    functions: dict[str, Any] = {name: widened(getattr(phase, name)) for name in names}
+    return replace(phase, **functions)
 
 
 def _new(name: str, taken: Container[str]) -> str:

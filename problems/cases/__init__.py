@@ -1,1 +1,1 @@
-"""The cases: one file each, or a folder where a case has several."""
+"""The cases: a module each, or one for several that are alike; a folder where these take more."""

@@ -12,32 +12,45 @@ from statements import INF, NAN, bare, glider, refused
 
 from problems import Phase, Problem
 
-# Numbers
-
-
-BAD_BOUNDS = [
-    (1, 0),
-    (0, INF),
-    (NAN, 1),
-    (0, None),
-    None,
-    3,
-    (0, 1, 2),
-    ("0", "1"),
-    (0, 1j),
-    (0, 10**400),
-    (0, ca.MX.sym("q")),
-    {"a": 1},
-    (),
+BAD_BOUNDS = [(1, 0), (0, INF), (NAN, 1), (0, None), None, 3, (0, 1, 2), ("0", "1"), (0, 1j), (0, 10**400), (0, ca.MX.sym("q")), {"a": 1}]
+MISTAKES = [
+    *[(lambda p, f, b=b: f.state("speed", bounds=b), ("speed", "descent")) for b in [*BAD_BOUNDS, (2, 2)]],
+    *[(lambda p, f, b=b: f.control("brake", bounds=b), ("brake", "descent")) for b in BAD_BOUNDS],
+    *[(lambda p, f, b=b: p.parameter("mass", bounds=b), ("mass", "glider")) for b in BAD_BOUNDS],
+    *[(lambda p, f, v=v: f.state("speed", bounds=(0, 10), initial=v), ("speed", "initial")) for v in (11, (0, 11), NAN, (6, 5), "5")],
+    *[(lambda p, f, v=v: f.state("speed", bounds=(0, 10), final=v), ("speed", "final")) for v in (11, (0, 11), NAN, (6, 5), "5")],
+    *[(lambda p, f, s=s: f.state("speed", bounds=(0, 1), scale=s), ("speed",)) for s in (0, -1, NAN, "1")],
+    *[(lambda p, f, s=s: f.path("load", f["flap"], upper=1, scale=s), ("load",)) for s in (0, NAN)],
+    *[(lambda p, f, s=s: p.parameter("mass", bounds=(0, 1), scale=s), ("mass",)) for s in (0, NAN)],
+    *[(lambda p, f, s=s: p.minimize("cost", f.tf, scale=s), ("cost",)) for s in (0, NAN)],
+    *[(lambda p, f, w=w: f.control("bank", bounds=(-1, 1), period=w), ("bank",)) for w in (0, 3, NAN, "2")],
+    *[(lambda p, f, w=w: p.phase("late", t0=0, tf=w), ("late", "tf")) for w in (INF, (0, INF), None, "5", [1])],
+    *[(lambda p, f, w=w: p.phase("late", t0=w, tf=1), ("late", "t0")) for w in (NAN, (2, 1))],
+    *[(lambda p, f, w=w: p.phase("late", t0=0, tf=(1, 2), duration=w), ("late", "duration")) for w in (-1, 0, (-1, 2), (2, 1), INF)],
+    *[
+        (lambda p, f, w=w: f.path("load", f["flap"], **w), ("load", "descent"))
+        for w in ({}, {"lower": 2, "upper": 1}, {"lower": NAN}, {"upper": "3"}, {"lower": ca.MX.sym("q")})
+    ],
+    *[(lambda p, f, w=w: p.constraint("fuel", f.tf, **w), ("fuel", "glider")) for w in ({}, {"upper": INF})],
+    # Names are words, which are used once, and texts that a file can hold, as units are.
+    *[(lambda p, f, n=n: Problem(n), ("name",)) for n in ("", " ", None, 3, "a\0b", "a\ud800b")],
+    *[(lambda p, f, n=n: p.phase(n, t0=0, tf=1), ("glider",)) for n in ("", None, "a\0b", "descent")],
+    *[(lambda p, f, n=n: p.parameter(n, bounds=(0, 1)), ("glider",)) for n in ("", None, "a\ud800b", "wind")],
+    *[(lambda p, f, n=n: p.maximize(n, f.tf), ("glider",)) for n in ("", None, "a\0b", "time")],
+    *[(lambda p, f, n=n: f.state(n, bounds=(0, 1)), ("descent",)) for n in ("", None, "a\0b", "height", "flap", "lift", "time", "t0")],
+    *[(lambda p, f, n=n: f.path(n, f["flap"], upper=1), ("descent",)) for n in (" ", 3, "a\0b", "height", "flap", "lift", "tf")],
+    *[(lambda p, f, u=u: p.parameter("mass", bounds=(0, 1), unit=u), ("mass", "unit")) for u in ("a\0b", "a\ud800b", 3)],
+    *[(lambda p, f, u=u: f.control("brake", bounds=(0, 1), unit=u), ("brake", "unit")) for u in ("a\0b", 3)],
+    (lambda p, f: p.phase("landing", t0=0, tf=1, time_unit="a\0b"), ("landing", "NUL")),
 ]
 
 
-@pytest.mark.parametrize("bounds", BAD_BOUNDS, ids=str)
-def test_bad_bounds_are_refused_with_the_name_of_the_variable(bounds):
-    problem, phase = bare()
-    refused(lambda: phase.state("height", bounds=bounds), "height", "descent")
-    refused(lambda: phase.control("flap", bounds=bounds), "flap", "descent")
-    refused(lambda: problem.parameter("mass", bounds=bounds), "mass", "glider")
+@pytest.mark.parametrize(("mistake", "words"), MISTAKES, ids=[f"{i}-{words[0]}" for i, (_, words) in enumerate(MISTAKES)])
+def test_mistakes_are_refused_by_the_users_own_names(mistake, words):
+    problem, phase = glider()
+    problem.parameter("wind", bounds=(0, 1))
+    phase.path("lift", phase["flap"], upper=1)
+    refused(lambda: mistake(problem, phase), *words)
 
 
 @pytest.mark.parametrize("bounds", [[0, 1], np.array([0, 1]), (np.float32(0), np.int64(1)), (ca.DM(0), ca.DM(1)), (ca.MX(0), 1)], ids=str)
@@ -49,108 +62,26 @@ def test_numbers_of_every_kind_are_bounds(bounds):
     assert (own.states[1].lower, own.states[1].upper) == own.final[1] == (0.0, 1.0) and own.initial[1] == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("word", ["initial", "final"])
-@pytest.mark.parametrize("value", [11, (0, 11), NAN, (6, 5), "5"], ids=str)
-def test_values_outside_bounds_are_refused(word, value):
-    refused(lambda: bare()[1].state("height", bounds=(0, 10), **{word: value}), "height", "descent", word)
-
-
-@pytest.mark.parametrize("scale", [0, -1, NAN, "1"], ids=str)
-def test_scales_are_positive_numbers(scale):
-    problem, phase = glider()
-    refused(lambda: phase.state("speed", bounds=(0, 1), scale=scale), "speed")
-    refused(lambda: phase.control("brake", bounds=(0, 1), scale=scale), "brake")
-    refused(lambda: phase.path("load", phase["flap"], upper=1, scale=scale), "load")
-    refused(lambda: problem.parameter("mass", bounds=(0, 1), scale=scale), "mass")
-    refused(lambda: problem.constraint("fuel", phase.tf, upper=1, scale=scale), "fuel")
-    refused(lambda: problem.minimize("cost", phase.tf, scale=scale), "cost")
-
-
 @pytest.mark.parametrize(
-    "times", [{"t0": NAN}, {"t0": (2, 1)}, {"tf": INF}, {"tf": (0, INF)}, {"tf": None}, {"tf": "5"}, {"tf": [1]}], ids=str
+    ("times", "word"),
+    [
+        ({"tf": 0}, "descent"),
+        ({"t0": 3}, "descent"),
+        ({"t0": (2, 3), "tf": (0, 2)}, "descent"),
+        ({"duration": 3}, "duration"),
+        ({"duration": (2.5, 3)}, "duration"),
+        ({"duration": (0.1, 0.5)}, "duration"),
+    ],
+    ids=str,
 )
-def test_bad_times_are_refused(times):
-    refused(lambda: glider(**times), "descent", next(iter(times)))
+def test_a_phase_must_last_as_long_as_it_says(times, word):
+    refused(lambda: glider(**times)[0].compile(), "descent", word)
 
 
-@pytest.mark.parametrize("duration", [-1, 0, (-1, 2), (2, 1), INF])
-def test_durations_are_positive(duration):
-    refused(lambda: glider(duration=duration), "descent", "duration")
-
-
-@pytest.mark.parametrize("times", [{"tf": 0}, {"tf": (-2, -1)}, {"t0": 3}, {"t0": (2, 3), "tf": (0, 2)}], ids=str)
-def test_a_phase_must_last(times):
-    refused(lambda: glider(**times)[0].compile(), "descent")
-
-
-@pytest.mark.parametrize("duration", [3, (2.5, 3), (0.1, 0.5)])
-def test_a_duration_that_the_times_do_not_allow_is_refused(duration):
-    refused(lambda: glider(duration=duration)[0].compile(), "descent", "duration")
-
-
-@pytest.mark.parametrize("period", [0, 3, NAN, "2"])
-def test_a_period_is_the_width_of_the_bounds(period):
-    refused(lambda: bare()[1].control("bank", bounds=(-1, 1), period=period), "bank")
-
-
-@pytest.mark.parametrize(
-    "limits", [{}, {"lower": 2, "upper": 1}, {"lower": NAN}, {"upper": "3"}, {"upper": INF}, {"lower": ca.MX.sym("q")}], ids=str
-)
-def test_bad_limits_are_refused(limits):
+def test_names_of_one_kind_do_not_disturb_another():
     problem, phase = glider()
-    refused(lambda: phase.path("load", phase["flap"], **limits), "load", "descent")
-    refused(lambda: problem.constraint("fuel", phase.tf, **limits), "fuel", "glider")
-
-
-# Names
-
-
-@pytest.mark.parametrize("name", ["", " ", None, 3], ids=str)
-def test_names_are_words(name):
-    problem, phase = glider()
-    refused(lambda: Problem(name))
-    refused(lambda: problem.phase(name, t0=0, tf=1), "glider")
-    refused(lambda: problem.parameter(name, bounds=(0, 1)), "glider")
-    refused(lambda: problem.minimize(name, phase.tf), "glider")
-    refused(lambda: problem.constraint(name, phase.tf, upper=1), "glider")
-    refused(lambda: phase.state(name, bounds=(0, 1)), "descent")
-    refused(lambda: phase.control(name, bounds=(0, 1)), "descent")
-    refused(lambda: phase.path(name, phase["flap"], upper=1), "descent")
-
-
-@pytest.mark.parametrize(("text", "wrong"), [("a\0b", "NUL"), ("a\ud800b", "surrogate")])
-def test_names_and_units_are_texts_that_a_file_can_hold(text, wrong):
-    problem, phase = glider()
-    refused(lambda: Problem(text), wrong)
-    refused(lambda: problem.phase(text, t0=0, tf=1), "glider", wrong)
-    refused(lambda: problem.phase("landing", t0=0, tf=1, time_unit=text), "landing", wrong)
-    refused(lambda: phase.path(text, phase["flap"], upper=1), "descent", wrong)
-    for name, unit, words in ((text, "", ("name",)), ("new", text, ("unit", "new"))):
-        refused(lambda name=name, unit=unit: problem.parameter(name, bounds=(0, 1), unit=unit), "glider", wrong, *words)
-        refused(lambda name=name, unit=unit: problem.minimize(name, phase.tf, unit=unit), "glider", wrong, *words)
-        refused(lambda name=name, unit=unit: phase.state(name, bounds=(0, 1), unit=unit), "descent", wrong, *words)
-        refused(lambda name=name, unit=unit: phase.control(name, bounds=(0, 1), unit=unit), "descent", wrong, *words)
-
-
-@pytest.mark.parametrize("name", ["height", "flap", "load", "time", "t0", "tf"])
-def test_a_phase_uses_a_name_once(name):
-    _, phase = glider()
-    phase.path("load", phase["flap"], upper=1)
-    refused(lambda: phase.state(name, bounds=(0, 1)), name, "descent", "twice")
-    refused(lambda: phase.control(name, bounds=(0, 1)), name, "descent", "twice")
-    refused(lambda: phase.path(name, phase["flap"], upper=1), name, "descent", "twice")
-
-
-def test_a_problem_uses_a_name_once_in_each_kind():
-    problem, phase = glider()
-    problem.parameter("mass", bounds=(0, 1))
     problem.constraint("fuel", phase.tf, upper=9)
-    refused(lambda: problem.phase("descent", t0=0, tf=1), "descent", "twice")
-    refused(lambda: problem.parameter("mass", bounds=(0, 1)), "mass", "twice")
     refused(lambda: problem.constraint("fuel", phase.tf, upper=1), "fuel", "twice")
-    refused(lambda: problem.minimize("time", phase.tf), "time", "twice")
-    refused(lambda: problem.maximize("time", phase.tf), "time", "twice")
-    # Kinds do not disturb each other, and neither do phases.
     problem.minimize("fuel", phase.tf)
     problem.constraint("descent", phase.tf, upper=9)
     problem.phase("landing", t0=0, tf=1).state("height", bounds=(0, 1))

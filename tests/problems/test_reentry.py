@@ -206,6 +206,12 @@ def flights() -> dict[str, list[Flight]]:
     return made
 
 
+def test_flights_without_commands_have_pictures():
+    nlp = DFET(4, 2).transcribe(load("betts"))
+    pictures = module_of("betts").plot([Flight(nlp.unpack(nlp.propagate(nlp.first_guess(nlp.guess[None]))[0]))])
+    assert "bank angle [deg]" in [ax.get_title(loc="left") for ax in pictures["population"].axes] and "ground-track" in pictures
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_pictures_show_states_limits_and_zones(case, flights, tmp_path):

@@ -73,12 +73,9 @@ QUICK = {
     "newton_nose": "dfet:8x3:bernstein",
     "orbit_raising": "dfet:40x3:bernstein:1",
     "rayleigh": "dfet:20x3",
-    "reorientation": "dfet:40x3:bernstein:1",
-    "robot_arm": "dfet:40x3:bernstein:1",
     "schwartz": "dfet:8x3:bernstein",
     "sounding_rocket": "dfet:3x5:bernstein:3",
     "stirred_tank": "dfet:20x3",
-    "tuberculosis": "dfet:20x3:bernstein",
     "tumour": "dfet:40x3:bernstein:1",
     "two_link_arm": "dfet:40x3:bernstein:1",
     "van_der_pol": "dfet:20x3",
@@ -94,6 +91,9 @@ SLOW = {
     "hypersensitive": "dfet:60x5",
     "missile": "dfet:20x3",
     "plane_change": "dfet:30x4:bernstein",
+    "reorientation": "dfet:40x3:bernstein:1",
+    "tuberculosis": "dfet:20x3:bernstein",
+    "robot_arm": "dfet:40x3:bernstein:1",
 }
 LIMIT = 5e-3
 """Largest violation when simulated: the usual basis may leave limits a little between its nodes."""
