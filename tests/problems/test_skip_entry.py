@@ -143,7 +143,8 @@ def test_the_ends_the_limits_the_bounds_and_the_objectives(case):
     compiled, lowest = load(case).compile(), LOWEST[case]
     down, up = compiled.phases
     assert [(goal.name, goal.unit, goal.sense) for goal in compiled.goals] == GOALS[case]
-    assert down.initial == pytest.approx([(value, value) for value in (*START, 17.42 * DEGREE, -75 * DEGREE, 0.0)[: len(down.states)]])
+    begin = [*START, 17.42 * DEGREE, -75 * DEGREE, 0.0][: len(down.states)]
+    np.testing.assert_allclose(down.initial, [(value, value) for value in begin], rtol=1e-9)
     assert down.final[0] == (lowest, lowest) and down.final[4] == (0, 0) and up.final[0] == (79248.0, 79248.0)
     for phase in compiled.phases:
         assert [path.upper for path in phase.paths] == pytest.approx(LIMITS)
