@@ -29,24 +29,12 @@ from ..gradients.front_polish import KEPT_INSIDE
 from ..gradients.scalarised import GradientSolves
 from ..io.console import working
 from ..preferences import Preference, Ranges, Stage
-from ..preferences.preference import BEYOND, CONFIRMED, standing
+from ..preferences.preference import BEYOND, CONFIRMED, keeps_limits, standing, within_limits
 from ..preferences.ranges import shown
-from ..preferences.stage import LIMIT_TOL, exceeded, ordering
+from ..preferences.stage import LIMIT_TOL, conflict_message, exceeded, excess_stage, ordering, with_all_limits
 from ..solvers.start import beginning
 from .choice import Choice, Step
-from .stages import (
-    ONLY_NEAR,
-    SAME_VALUE,
-    StageBound,
-    StageSolution,
-    StageSolver,
-    StartVectors,
-    conflict_message,
-    excess_stage,
-    keeps_limits,
-    with_all_limits,
-    within_limits,
-)
+from .stages import ONLY_NEAR, SAME_VALUE, StageBound, StageSolution, StageSolver, StartVectors
 
 NO_OPTIMUM = "it is feasible, but where a solve ended before its optimum"
 """Note of a point at which a solve failed."""

@@ -1,14 +1,13 @@
-"""Gradient solves of one stage of a preference, on a given transcription or on a mesh that is found; and the hard limits of all stages."""
+"""Gradient solves of one stage of a preference: on a given transcription, or on a mesh that is found."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from problems.compiled import CompiledProblem, Objective
+from problems.compiled import CompiledProblem
 from problems.valued import ObjectiveBox, Valued, valued
 from transcription import from_dict
 from transcription.base import NLP
@@ -19,7 +18,6 @@ from transcription.stopping import Stopped
 
 from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import certified, from_vectors
-from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs
 from ..fronts.verified import unmarked
@@ -27,9 +25,7 @@ from ..gradient_tools import MESHES, PART
 from ..gradients.multistart import MultistartSolver
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..preferences import Stage
-from ..preferences.preference import BEYOND, standing
-from ..preferences.ranges import shown
-from ..preferences.stage import LIMIT_TOL, exceeded
+from ..preferences.stage import no_limits
 from ..refinement.found_optimum import found_optimum
 from ..refinement.mending import solved_again
 from ..refinement.mesh_loop import MeshLoop, Programs
@@ -179,7 +175,7 @@ class StageSolver:
         room = self._room * self._box.scales
         box = replace(self._box, lower=ends.min(axis=0) - room, upper=ends.max(axis=0) + room)
         # Without its limits: a start may exceed them.
-        values = replace(stage, limits=_nothing).numbers(J)
+        values = replace(stage, limits=no_limits).numbers(J)
         values = values[np.isfinite(values)]
         # The part of its size, and of 1 at least, by which later stages may exceed what a stage attained.
         limits = [(one, value + 1e-7 * max(abs(value), 1.0)) for one, value in kept]
@@ -218,48 +214,3 @@ def _confirmed_ends(known: Points) -> Points:
     rows = np.flatnonzero(known.verified)
     F = known.F[rows]
     return known[sorted({int(rows[k]) for k in [*F.argmin(axis=0), *F.argmax(axis=0)]} if len(rows) else [])]
-
-
-def with_all_limits(stages: Sequence[Stage], m: int) -> list[Stage]:
-    """The stages of m objectives, of which the first has all limits: the later ones keep it, and so have them, too. Those of one name are
-    one limit; without names, each is one of its own."""
-    places: dict[str | tuple[int, int], tuple[int, int, str]] = {}
-    for i, stage in enumerate(stages):
-        for k, name in enumerate(stage.titles(len(stage.limits([1.0] * m)))):
-            places.setdefault(name if stage.limit_names else (i, k), (i, k, name))
-
-    def every(J: Sequence[Any]) -> list[Any]:
-        found = [stage.limits(J) for stage in stages]
-        return [found[i][k] for i, k, _ in places.values()]
-
-    bare = [replace(stage, limits=_nothing, limit_names=()) for stage in stages]
-    return [replace(bare[0], limits=every, limit_names=tuple(name for _, _, name in places.values())), *bare[1:]]
-
-
-def excess_stage(limits: Stage) -> Stage:
-    """The stage of which the value is the largest excess over the limits of another."""
-    return Stage("largest excess over hard limits", lambda J, peaks: peaks[0], lambda J: [limits.limits(J)])
-
-
-def within_limits(limits: Stage, point: Point) -> bool:
-    """Whether a point is within the limits of a stage."""
-    return bool(limits.excess(np.array([[*point.objectives.values()]]))[0] <= LIMIT_TOL)
-
-
-def keeps_limits(limits: Stage, point: Point, verify: float) -> bool:
-    """Whether a feasible point is within the limits of a stage, as far as `standing` tells."""
-    return bool(standing([limits], point.alone(), verify)[0] < BEYOND)
-
-
-def conflict_message(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
-    """Text with the limits that cannot be met, by objectives (m,) that exceed them as little as possible: those in conflict are exceeded
-    alike there, by half of the largest excess at least."""
-    excess = limits.excesses(J[None])[0]
-    names = [limits.titles(len(excess))[k] for k in np.flatnonzero(excess >= 0.5 * excess.max())]
-    nearest = ", ".join(f"{goal.name} {shown(float(value), goal)}" for goal, value in zip(goals, J, strict=True))
-    what = f"all of: {', '.join(names)}" if len(names) > 1 else names[0]
-    return f"no point was found that meets {what}; the nearest has {nearest}: {exceeded(limits, goals, J)}"
-
-
-def _nothing(J: Sequence[Any]) -> list[Any]:
-    return []

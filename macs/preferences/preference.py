@@ -342,6 +342,16 @@ def standing(stages: Sequence[Stage], points: Points, verify: float | None = Non
     return np.where(sure <= DOUBTFUL, sure + np.where(beyond, BEYOND, CONFIRMED), INFEASIBLE)
 
 
+def within_limits(limits: Stage, point: Point) -> bool:
+    """Whether a point is within the limits of a stage."""
+    return bool(limits.excess(np.array([[*point.objectives.values()]]))[0] <= LIMIT_TOL)
+
+
+def keeps_limits(limits: Stage, point: Point, verify: float) -> bool:
+    """Whether a feasible point is within the limits of a stage, as far as `standing` tells."""
+    return bool(standing([limits], point.alone(), verify)[0] < BEYOND)
+
+
 def _message(stages: Sequence[Stage], front: Points, rank: np.ndarray, order: np.ndarray) -> str:
     """What is to be known about the best point."""
     best, parts = rank[order[0]], []

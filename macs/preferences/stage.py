@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
@@ -49,7 +49,8 @@ ATTAINED = 1e-9
 """A value that is not larger counts as zero."""
 
 
-def _nothing(J: Sequence[Operand]) -> list[Any]:
+def no_limits(J: Sequence[Operand]) -> list[Any]:
+    """No limits, and no groups."""
     return []
 
 
@@ -86,8 +87,8 @@ class Stage:
 
     name: str
     value: Callable[[Sequence[Operand], Sequence[Operand]], Operand]
-    groups: Callable[[Sequence[Operand]], list[list[Operand]]] = _nothing
-    limits: Callable[[Sequence[Operand]], list[Operand]] = _nothing
+    groups: Callable[[Sequence[Operand]], list[list[Operand]]] = no_limits
+    limits: Callable[[Sequence[Operand]], list[Operand]] = no_limits
     limit_names: tuple[str, ...] = ()
     after_zero: bool = False
 
@@ -143,6 +144,37 @@ def _columns(objectives: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
     """The m columns of objectives (n, m), with 0 in rows that are not finite, and the mask (n,) of the rows that are."""
     good = np.isfinite(objectives).all(axis=1)
     return list(np.where(good[:, None], objectives, 0.0).T), good
+
+
+def with_all_limits(stages: Sequence[Stage], m: int) -> list[Stage]:
+    """The stages of m objectives, of which the first has all limits: the later ones keep it, and so have them, too. Those of one name are
+    one limit; without names, each is one of its own."""
+    places: dict[str | tuple[int, int], tuple[int, int, str]] = {}
+    for i, stage in enumerate(stages):
+        for k, name in enumerate(stage.titles(len(stage.limits([1.0] * m)))):
+            places.setdefault(name if stage.limit_names else (i, k), (i, k, name))
+
+    def every(J: Sequence[Any]) -> list[Any]:
+        found = [stage.limits(J) for stage in stages]
+        return [found[i][k] for i, k, _ in places.values()]
+
+    bare = [replace(stage, limits=no_limits, limit_names=()) for stage in stages]
+    return [replace(bare[0], limits=every, limit_names=tuple(name for _, _, name in places.values())), *bare[1:]]
+
+
+def excess_stage(limits: Stage) -> Stage:
+    """The stage of which the value is the largest excess over the limits of another."""
+    return Stage("largest excess over hard limits", lambda J, peaks: peaks[0], lambda J: [limits.limits(J)])
+
+
+def conflict_message(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -> str:
+    """Text with the limits that cannot be met, by objectives (m,) that exceed them as little as possible: those in conflict are exceeded
+    alike there, by half of the largest excess at least."""
+    excess = limits.excesses(J[None])[0]
+    names = [limits.titles(len(excess))[k] for k in np.flatnonzero(excess >= 0.5 * excess.max())]
+    nearest = ", ".join(f"{goal.name} {shown(float(value), goal)}" for goal, value in zip(goals, J, strict=True))
+    what = f"all of: {', '.join(names)}" if len(names) > 1 else names[0]
+    return f"no point was found that meets {what}; the nearest has {nearest}: {exceeded(limits, goals, J)}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ from macs.decisions import (
     Smaller,
     decide,
 )
-from macs.decisions.stages import ONLY_NEAR, keeps_limits
+from macs.decisions.stages import ONLY_NEAR
 from macs.fronts.points import Points
 from macs.gradients.front_polish import KEPT_INSIDE
 from macs.preferences.stage import exceeded
@@ -202,18 +202,6 @@ def test_what_stands_is_what_a_ranking_has_first(until: float) -> None:
     assert choice.objectives == best.objectives and best.objectives["time"] == pytest.approx(3.8 if until > 3.8 else 5.0, abs=0.02)
     over = f"'time at most {until:g} s' is missed by {known.F[0, 1] - until:.6g} s"
     assert over in choice.message and (over in wanted.rank(known, BOTH).message) is (until > 3.8)
-
-
-def test_what_was_simulated_is_to_keep_the_limits_too() -> None:
-    (stage,) = QUICK.stages(swing().compile().goals, BOTH)
-    front = _at(3.9)
-    point, F = front[0], np.array([[-point.objectives["end"], 4.0 + 2.8 * 2e-3] for point in front])
-    assert keeps_limits(stage, point, 1e-3)
-    moved = front.replace(simulated_F=F, verified=[False])[0]
-    assert not keeps_limits(stage, moved, 1e-3) and keeps_limits(stage, moved, 1e-2)
-    # Of one that is confirmed, the objectives are as they say.
-    assert keeps_limits(stage, front.replace(simulated_F=F)[0], 1e-3)
-    assert not keeps_limits(stage, front.replace(simulated_F=F * np.nan, verified=[False])[0], 1e-2)
 
 
 def test_what_an_earlier_stage_attained_stands_where_a_later_solve_ends_early() -> None:

@@ -9,8 +9,8 @@ import pytest
 from choices import plain_front
 
 from macs.decisions import Stage
-from macs.decisions.stages import conflict_message, excess_stage, keeps_limits, with_all_limits, within_limits
-from macs.preferences.stage import LIMIT_TOL
+from macs.preferences.preference import keeps_limits, within_limits
+from macs.preferences.stage import LIMIT_TOL, conflict_message, excess_stage, with_all_limits
 from problems.compiled import Objective
 
 TIME, MASS = Objective("time", "s"), Objective("mass")
