@@ -28,8 +28,6 @@ from .report.sensitivity import check_dispersions, check_nominal
 if TYPE_CHECKING:
     from .report.report import Report
 
-QUICK_RUNS, QUICK_EVALUATIONS, QUICK_LEAST, MANY_CELLS = 2, 500, 50, 8
-
 
 def _key(kind: Any = None, *, decides: bool = False, record: Callable[[Any], Any] | None = plain) -> dict[str, Any]:
     """The metadata of a field of `Study` that is a key of study files."""
@@ -295,16 +293,14 @@ class Study:
 
         Budgets of solvers on terms of their own shrink as the largest does. Its name ends in -quick.
         """
-        share = min(1.0, QUICK_EVALUATIONS / max(cell.planned for cell in self.cells))
+        share = min(1.0, 500 / max(cell.planned for cell in self.cells))
         own = {label: dict(terms) for label, terms in self.terms.items()}
         for label, terms in own.items():
             if "evaluations" in terms:
                 given = {cell.problem: cell.planned for cell in self.cells if cell.solver == label}
-                terms["evaluations"] = {problem: min(n, max(QUICK_LEAST, int(share * n))) for problem, n in given.items()}
-        budgets = {
-            cell.problem: min(cell.planned, QUICK_EVALUATIONS) for cell in self.cells if "evaluations" not in own.get(cell.solver, {})
-        }
-        runs = min(self.runs, QUICK_RUNS if len(self.cells) <= MANY_CELLS else 1)
+                terms["evaluations"] = {problem: min(n, max(50, int(share * n))) for problem, n in given.items()}
+        budgets = {cell.problem: min(cell.planned, 500) for cell in self.cells if "evaluations" not in own.get(cell.solver, {})}
+        runs = min(self.runs, 2 if len(self.cells) <= 8 else 1)
         return replace(self, name=f"{self.name}-quick", runs=runs, evaluations=budgets or None, terms=own)
 
     def definition(self) -> dict[str, Any]:

@@ -42,12 +42,8 @@ from .cells import Cell
 MISSING, UNREADABLE = "missing", "unreadable"
 
 
-FORMAT, VERSION = "macs study", 2
+FORMAT, STUDY_VERSION = "macs study", 2
 """Of study.json."""
-
-
-LONGEST, MOST = 200, 20
-"""Characters of a reason why a run failed, and number of reasons that a summary lists."""
 
 
 class Definition(msgspec.Struct):
@@ -161,9 +157,9 @@ class StudySummary:
             median = duration(float(np.median(times))) if times else "-"
             rows.append([*cell.labels, *(str(counts[kind]) for kind in ("finished", "failed", "missing")), median])
             failed = (run for run in runs if not run.finished and run.status != MISSING)
-            reasons += [f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:LONGEST] for run in failed]
-        more = [f"and {len(reasons) - MOST} more"] if len(reasons) > MOST else []
-        return rows, [*reasons[:MOST], *more]
+            reasons += [f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:200] for run in failed]
+        more = [f"and {len(reasons) - 20} more"] if len(reasons) > 20 else []
+        return rows, [*reasons[:20], *more]
 
 
 class Store:
@@ -186,8 +182,8 @@ class Store:
             data = read_record(record)
             if data["format"] != FORMAT:
                 raise ValueError("it is not the record of a study")
-            if data["version"] != VERSION:
-                raise ValueError(f"another version of MACS wrote it (format {data['version']}, not {VERSION}): use that version")
+            if data["version"] != STUDY_VERSION:
+                raise ValueError(f"another version of MACS wrote it (format {data['version']}, not {STUDY_VERSION}): use that version")
             return cls(path, data["study"], trust)
         except FileNotFoundError:
             raise ValueError(f"'{out}' contains no study: there is no study.json in it") from None
@@ -210,7 +206,7 @@ class Store:
             known = cls._suits(path, definition)
             latest = {**definition, "runs": max(definition["runs"], known.definition["runs"] if known else 0)}
             if known is None or latest != known.definition:
-                record = {"format": FORMAT, "version": VERSION, "study": latest}
+                record = {"format": FORMAT, "version": STUDY_VERSION, "study": latest}
                 write_whole(path / "study.json", to_record(record, indent=1))
             yield cls(path, latest)
 

@@ -25,7 +25,7 @@ from transcription.stopping import stopped_by
 from ..measures.indicators import gd, hypervolume, igd
 from .contract import ASKED, SECONDS, Bench, Column, Effort, Row, Target, column, finished, rounds_of, short
 
-POINTS = 10
+FRONT_SIZE = 10
 """Points of every front."""
 
 
@@ -191,7 +191,7 @@ def search_rounds(case: SearchCase, effort: Effort, steps: Steps) -> Callable[[i
     def measured(seed: int) -> Iterable[Row]:
         problem, method = case.stated()
         budget = min(case.evaluations, effort.evaluations or case.evaluations)
-        ours = finished(MACS(agents=POINTS, archive=POINTS).solve(problem, method, evaluations=budget, seed=seed))
+        ours = finished(MACS(agents=FRONT_SIZE, archive=FRONT_SIZE).solve(problem, method, evaluations=budget, seed=seed))
         theirs = sweeps(problem, method, ours.stats["work"], seed, steps)
         union = np.vstack([ours.F, theirs.F])
         volumes = [hypervolume(front.F, union) for front in (ours, theirs)]
@@ -214,13 +214,13 @@ def sweeps(problem: Problem, method: Transcription, work: int, seed: int, steps:
         known = front if k % 2 == 0 and front is not None and len(front) else None
         more = swept(problem, method, steps, starts=4 if k else 1, seed=1000 * seed + k, start=known)
         front, k = more if front is None else Front.merge([front, more]), k + 1
-    return front[np.flatnonzero(spread(front.F, POINTS))] if len(front) > POINTS else front
+    return front[np.flatnonzero(spread(front.F, FRONT_SIZE))] if len(front) > FRONT_SIZE else front
 
 
 def swept(problem: Problem, method: Transcription, steps: Steps, **settings: object) -> Front:
     """A sweep that Ctrl-C ends."""
     with stopped_by(steps.asked):
-        front = sweep(problem, method, points=POINTS, **settings)  # type: ignore[arg-type]
+        front = sweep(problem, method, points=FRONT_SIZE, **settings)  # type: ignore[arg-type]
     steps.check()
     return front
 
@@ -242,11 +242,11 @@ COUNTS: tuple[Column, ...] = (
 )
 SEARCH = Bench(
     title="searches",
-    about=f"SEARCHES: MACS with its defaults against gradient sweeps from many starts, on the same mesh, {POINTS} points, for the same "
-    "work. The first sweep has one start, others 4, from nothing and from the best known in turn; their points are thinned by the "
-    "archive's rule. Hypervolume: as multiples of that of the sweeps, normalised by ideal and nadir of both, up to 1.1. GD, IGD: "
-    "distances to the true front and from it, normalised by its range. Work: as `stats` count it, the same way for both; a sweep "
-    "gets to its end, so that the sweeps have more of it. Median and quartiles over seeds, least and greatest of few.",
+    about=f"SEARCHES: MACS with its defaults against gradient sweeps from many starts, on the same mesh, {FRONT_SIZE} points, for the "
+    "same work. The first sweep has one start, others 4, from nothing and from the best known in turn; their points are thinned by "
+    "the archive's rule. Hypervolume: as multiples of that of the sweeps, normalised by ideal and nadir of both, up to 1.1. GD, "
+    "IGD: distances to the true front and from it, normalised by its range. Work: as `stats` count it, the same way for both; a "
+    "sweep gets to its end, so that the sweeps have more of it. Median and quartiles over seeds, least and greatest of few.",
     full=Effort(CASES, rounds=5),
     quick=Effort(tuple(replace(case, evaluations=budget) for case, budget in LESS.items())),
     prepare=search_rounds,
@@ -277,7 +277,7 @@ def front_rounds(case: SearchCase, effort: Effort, steps: Steps) -> Callable[[in
     problem, method = case.stated()
 
     def search(seed: int, inner: str, evaluations: int | None) -> Front:
-        solver = MACS(archive=POINTS, mesh="fixed")
+        solver = MACS(archive=FRONT_SIZE, mesh="fixed")
         return finished(solver.solve(problem, method, evaluations=evaluations, seed=seed, inner=inner, verify=None))
 
     def measured(seed: int) -> Iterable[Row]:
@@ -291,7 +291,7 @@ def front_rounds(case: SearchCase, effort: Effort, steps: Steps) -> Callable[[in
             fronts[who] = swept(problem, method, steps, starts=starts, seed=seed, verify=None)
         union = np.vstack([front.F for front in fronts.values()])
         best = union[nondominated(union)]
-        most = hypervolume(best[np.flatnonzero(spread(best, POINTS))] if len(best) > POINTS else best, best)
+        most = hypervolume(best[np.flatnonzero(spread(best, FRONT_SIZE))] if len(best) > FRONT_SIZE else best, best)
         for who, front in fronts.items():
             values = {key: front.stats[key] for key in ("evaluations", "work", "gradient_solves")}
             values |= {"volume": hypervolume(front.F, best) / most, "good": as_good(front.F, fronts[DONE].F), "points": len(front)}
@@ -343,11 +343,11 @@ def beside_sweeps(rows: Sequence[Row]) -> list[str]:
 
 FRONT = Bench(
     title="fronts",
-    about=f"FRONTS: MACS with defaults until it is done, {POINTS} points, on a given mesh, not simulated. 'propagate' and 'projection': "
-    "the same search with these inner levels, and the fewest evaluations of a few numbers with which its front is as good as ours: "
-    "0.99 of the hypervolume, ends within 0.001 of the ranges; the time is that of this search alone. Where none is as good, the "
-    "time is that of the most evaluations. 'sweep': from the problem's guess, one start or ten a point. Volume: in that of ten "
-    "points of the best of all of one seed. Median and quartiles over seeds, least and greatest of few.",
+    about=f"FRONTS: MACS with defaults until it is done, {FRONT_SIZE} points, on a given mesh, not simulated. 'propagate' and "
+    "'projection': the same search with these inner levels, and the fewest evaluations of a few numbers with which its front is as "
+    "good as ours: 0.99 of the hypervolume, ends within 0.001 of the ranges; the time is that of this search alone. Where none is "
+    "as good, the time is that of the most evaluations. 'sweep': from the problem's guess, one start or ten a point. Volume: in "
+    "that of ten points of the best of all of one seed. Median and quartiles over seeds, least and greatest of few.",
     full=Effort((GODDARD, ORBIT, ROCKET, CART, SITE, REACTOR), rounds=3),
     quick=Effort((GODDARD, SITE), evaluations=500),
     prepare=front_rounds,

@@ -10,7 +10,6 @@ import pytest
 
 import macs
 from macs import Front
-from macs.gradients.multistart import MultistartSolver
 from runs.cli import main
 
 MACS = [sys.executable, "-m", "runs.cli"]
@@ -285,24 +284,6 @@ def test_a_wrong_call_in_a_process(here):
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
 
 
-@pytest.mark.slow
-def test_ctrl_c_keeps_what_gradient_tools_found(capsys, monkeypatch):
-    """They evaluate no candidates, which is no sign of nothing found."""
-    solve, interrupted = MultistartSolver.from_vector, []
-
-    def then_interrupted(self, *task, **more):
-        found = solve(self, *task, **more)
-        # A second Ctrl-C would end the work at once.
-        if self.solves.counts.gradient_solves == 4 and not interrupted:
-            interrupted.append(signal.raise_signal(signal.SIGINT))
-        return found
-
-    monkeypatch.setattr(MultistartSolver, "from_vector", then_interrupted)
-    assert main(["solve", "goddard", "--solver", "payoff", "--out", "ends.nc"]) == 130
-    assert "front saved in ends.nc" in capsys.readouterr().out
-    assert len(Front.load("ends.nc")) == 2 and Front.load("ends.nc").stats["stopped"] == "interrupted"
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.parametrize("number", [pytest.param("SIGINT", marks=pytest.mark.slow), "SIGTERM"])
 def test_ctrl_c_and_kill_keep_what_was_found(here, number):
@@ -329,16 +310,10 @@ def test_data_go_to_the_function_and_stay_with_the_front(capsys):
 
 
 @pytest.mark.slow
-def test_a_front_is_the_start_of_a_search_with_other_data(capsys, monkeypatch):
+def test_a_front_is_the_start_of_a_search_with_other_data(capsys):
     assert main(["solve", "glide.py:build", "--evaluations", "40", "--seed", "1", "--out", "front.nc"]) == 0
-    begun = []
-    begin = macs.MACS.begin
-    monkeypatch.setattr(macs.MACS, "begin", lambda self, *rest, **more: begun.append((rest, more)) or begin(self, *rest, **more))
     call = ["solve", "glide.py:build", "--data", "speed=2", "--start", "front.nc", "--evaluations", "40", "--seed", "1"]
     assert main([*call, "--out", "other.nc"]) == 0
-    ((rest, more),) = begun
-    start = more.get("start", rest[-1])
-    assert start.shape[0] >= len(Front.load("front.nc")), "its points are the first candidates"
     assert Front.load("other.nc").objectives[:, 1].max() == pytest.approx(10.0)
 
 
@@ -434,15 +409,6 @@ def test_verify_says_which_point_fails_and_why(saved, capsys):
     out = capsys.readouterr().out
     assert "FAILS" in out and ": simulated, it ends" in out
     assert "belongs to problem 'goddard'" in wrong(capsys, "verify", path, "--problem", "orbit_rise")
-
-
-@pytest.mark.slow
-def test_a_cut_file_is_one_line(saved, capsys):
-    whole = (saved[0] / "front.nc").read_bytes()
-    Path("cut.nc").write_bytes(whole[: len(whole) // 2])
-    assert "cut.nc" in wrong(capsys, "show", "cut.nc")
-    done = subprocess.run([*MACS, "verify", "cut.nc"], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "cut.nc" in done.stderr
 
 
 def test_a_result_overwrites_no_file_of_another_kind(capsys, tmp_path, monkeypatch):

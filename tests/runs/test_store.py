@@ -158,13 +158,6 @@ def test_another_study_is_refused_with_the_first_difference(store, changes, word
     store.check(study(runs=7, time_limit=5.0).definition())  # which decides no number
 
 
-def test_cells_that_are_only_here_are_named(tmp_path):
-    with Store.claim(tmp_path, study(solvers={"small": NSGA2(population=4)}).definition()) as store:
-        pass
-    with pytest.raises(ValueError, match="large' is here but not there"):
-        store.check(study().definition())
-
-
 def test_folders_of_something_else_are_refused(tmp_path):
     definition = study().definition()
     for name in (".hidden", "b.txt", "a.txt"):
