@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -19,7 +20,7 @@ from .numerics.batched import Batched, expanded
 from .phases.adjoint import Adjoint, PhaseMultipliers
 from .phases.layout import Layout
 from .phases.reduced import Reduced
-from .phases.rows import EndSlots, Parts, Pointwise, Rows
+from .phases.rows import EndSlots, Parts, Rows
 from .phases.writer import PhaseWriter, along, filled
 from .stopping import check_stopping
 from .trajectories.trajectory import PiecewisePolynomial, Trajectory
@@ -94,12 +95,12 @@ class Assembly:
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
-            costates=lambda z, multipliers: self.costates(z, {name: multipliers[own] for name, own in rows.dynamics.items()}),
+            costates=partial(self.costates, rows),
             widen=self.widened,
             measure=lambda: self._filled(function("quantities", **{f"q{i}": one for i, one in enumerate(quantities)})),
-            adjoint=lambda z, *multipliers, swept=False: self.adjoint(z, self._split(rows, *multipliers), swept),
+            adjoint=partial(self.adjoint, rows),
             dense=sum(writer.dense for writer in self._declared),
-            parts=None if points is None else _parts(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
+            parts=None if points is None else Parts.of(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
         )
 
     def guess(self) -> np.ndarray:
@@ -199,29 +200,28 @@ class Assembly:
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
 
-    def costates(self, z: np.ndarray, multipliers: Mapping[str, np.ndarray]) -> dict[str, PiecewisePolynomial]:
-        """`multipliers` of the rows of dynamics by phase."""
+    def costates(self, rows: Rows, z: np.ndarray, multipliers: np.ndarray) -> dict[str, PiecewisePolynomial]:
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
-        found = {writer.phase.name: writer.costates(extended, multipliers[writer.phase.name]) for writer in self._declared}
+        found = {w.phase.name: w.costates(extended, multipliers[rows.dynamics[w.phase.name]]) for w in self._declared}
         return {name: costates for name, costates in found.items() if costates is not None}
 
-    def adjoint(self, z: np.ndarray, multipliers: Mapping[str, PhaseMultipliers], swept: bool) -> dict[str, Adjoint]:
-        """Multipliers by phase."""
-        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
-        return {name: _adjoint(writer, extended, multipliers[name], swept) for name, writer in ((w.phase.name, w) for w in self._declared)}
-
-    def _split(
-        self, rows: Rows, of_rows: np.ndarray, of_bounds: np.ndarray, weights: Mapping[str, np.ndarray]
-    ) -> dict[str, PhaseMultipliers]:
-        """Multipliers of rows (r,) and of bounds (n,), and the weights of integrals, by phase."""
-
-        def of(phase: str, kind: str) -> list[np.ndarray]:
-            return [of_rows[one] for one in rows.samples.get((phase, kind), ())]
-
-        return {
-            name: PhaseMultipliers(of_rows[own], of(name, "path"), of(name, "peak"), of(name, "state"), weights[name], of_bounds)
-            for name, own in rows.dynamics.items()
-        }
+    def adjoint(
+        self,
+        rows: Rows,
+        z: np.ndarray,
+        of_rows: np.ndarray,
+        of_bounds: np.ndarray,
+        weights: Mapping[str, np.ndarray],
+        *,
+        swept: bool = False,
+    ) -> dict[str, Adjoint]:
+        extended, found = self.layout.extended(np.asarray(z, dtype=float)[None])[0], {}
+        for writer in self._declared:
+            name = writer.phase.name
+            paths, peaks, states = ([of_rows[one] for one in rows.samples.get((name, kind), ())] for kind in ("path", "peak", "state"))
+            multipliers = PhaseMultipliers(of_rows[rows.dynamics[name]], paths, peaks, states, weights[name], of_bounds)
+            found[name] = _adjoint(writer, extended, multipliers, swept)
+        return found
 
     def interpolate(self, trajectory: Trajectory) -> np.ndarray:
         extended = self.layout.extended(np.zeros((1, len(self.layout.variables))))
@@ -326,13 +326,3 @@ def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultip
     # Only at t0 is the error one of the integration alone: elsewhere it is also that jumps are taken to lie at nodes.
     trusted = (found.error or 0.0) <= 1e-3
     return found.beside(known, np.array([v.scale for v in writer.phase.states])) if trusted else Adjoint(known)
-
-
-def _parts(z: ca.MX, points: Sequence[Pointwise], rows: ca.MX, quantities: ca.MX, scores: ca.Function) -> Parts:
-    values = [point.values for point in points]
-    return Parts(
-        tuple(point.function for point in points),
-        ca.Function("inputs", [z], [point.inputs for point in points]),
-        ca.Function("affine", [z, *values], [ca.densify(rows), ca.densify(quantities)]),
-        scores,
-    )

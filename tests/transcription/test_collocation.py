@@ -9,8 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, integrator, oscillator, oscillator_rates, slot
-from gauss import integrate
+from cases import candidates, integrator
 from numpy.polynomial import Polynomial, legendre
 from scipy.integrate import solve_ivp
 
@@ -129,22 +128,6 @@ def table_places(table) -> np.ndarray:
     return nodes(table.costate_basis, len(table.costates) - 1)
 
 
-def test_gauss_agrees_with_an_independent_implicit_runge_kutta_method():
-    nlp = Collocation(4, 3, points="gauss").transcribe(oscillator())
-    (z,) = nlp.propagate(nlp.first_guess(candidates(nlp, 1)))
-    flown = nlp.unpack(z)["swing"]
-    edges = flown.state.edges
-    m = z[slot(nlp, "m")]
-
-    def rates(j, t, x):
-        u = flown.control.on_element(j, np.array([2 * (t - edges[j]) / (edges[j + 1] - edges[j]) - 1]))[0]
-        return oscillator_rates(t, x, u, m, flown.tf)
-
-    ends, inside = integrate(rates, flown.edge_states[0], edges, 3)
-    assert flown.edge_states == pytest.approx(ends, abs=1e-11)
-    assert flown.state.coefficients[:, 1:-1] == pytest.approx(inside, abs=1e-11)
-
-
 # Orders of convergence
 
 ORDERS = [
@@ -215,7 +198,7 @@ def test_global_collocation_converges_exponentially(points):
     assert of_objective[2] < 2e-9 and of_state[3] < 5e-9 and of_control[3] < 1e-6
     assert (np.log10(of_state[:3] / of_state[1:4]) > 1.5).all(), "four degrees more give a digit and a half at least, every time"
     # From here on it is the accuracy of the solver.
-    assert of_objective[3:].max() < 1e-10 and of_state[3:].max() < 1e-8
+    assert of_objective[3:].max() < 1e-10 and of_state[3:].max() < (3e-9 if points == "chebyshev" else 1e-9)
 
 
 def regulated(method: Collocation) -> tuple[float, float]:

@@ -183,17 +183,6 @@ def test_a_time_limit_gives_a_timeout():
     assert found.clocked
 
 
-def test_periodic_controls_are_projected_the_short_way_round():
-    problem, phase = integrator(bounds=(-np.pi, np.pi), period=2 * np.pi, final=-1.9)
-    phase._rates = {}
-    phase.dynamics(x=ca.cos(phase["u"]))
-    problem.minimize("drift", phase.integral(ca.sin(phase["u"])))
-    nlp = DFET(3, 0).transcribe(problem)
-    found = inner_solver("ipopt").solve(nlp, np.array([[np.pi - 0.6, -np.pi + 0.1, 2.6]]))
-    assert found.status[0] == "converged" and found.moved[0] < 0.15
-    assert ((found.z >= nlp.lower) & (found.z <= nlp.upper)).all()
-
-
 # Names and strangers
 
 

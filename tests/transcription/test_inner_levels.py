@@ -195,18 +195,6 @@ def test_all_variables_with_bounds_are_searched_and_scored_as_they_are(method):
     assert inner_solver("none").solve(whole, inside).violation == pytest.approx(nlp.evaluate(inside)[1]), "nothing is propagated"
 
 
-def test_peaks_and_absolute_values_follow_from_the_rest():
-    problem, run = integrator()
-    problem.minimize("peak", run.peak(run["x"] ** 2))
-    problem.minimize("way", run.integral(ca.fabs(run["u"])))
-    nlp = Collocation(2, 3).nlp(problem.compile())
-    whole = nlp.whole
-    left = np.setdiff1d(np.arange(len(nlp.variables)), whole.free)
-    assert {nlp.variables[i].name.split("[")[0] for i in left} == {"run.peak", "run.size"}
-    z = inner_solver("none").solve(whole, candidates(whole, 1)).z
-    assert np.array_equal(z, nlp.tighten(z)) and np.abs(z[0, left]).max() > 0
-
-
 @pytest.mark.slow
 def test_a_population_search_has_the_dynamics_among_its_constraints():
     method = Collocation(2, 3)

@@ -44,13 +44,11 @@ def two_phases():
 @pytest.mark.parametrize(
     ("problem", "mesh"),
     [
-        (load("goddard"), DFET(4, 6)),
-        (load("orbit_rise"), DFET(5, 2)),
         (load("goddard"), DFET(3, 3, control_order=4, basis="bernstein")),
         (two_phases(), DFET(3, 2)),
         (two_phases(), Euler(6)),
     ],
-    ids=["goddard", "orbit", "bernstein", "two phases", "default derivatives"],
+    ids=["bernstein", "two phases", "default derivatives"],
 )
 def test_total_derivatives_are_those_of_differences(problem, mesh):
     nlp = mesh.transcribe(problem)

@@ -81,15 +81,6 @@ def test_an_inequality_stands_where_the_circle_alone_would_be_nearer() -> None:
     assert set(found.status) == {"converged"}
 
 
-def test_limits_that_contradict_each_other_where_they_are_linearised() -> None:
-    # On the parabola q = p^2 from near its vertex, q <= 0.2 and p >= 0.1 are met, though the tangents say otherwise on the way.
-    nlp = plane(lambda p, q: [(q - p**2, {"lower": 0.0, "upper": 0.0}), (q, {"upper": 0.2}), (p, {"lower": 0.1})])
-    x, found = solve(nlp, np.random.default_rng(0).uniform(-2, 2, (40, 2)))
-    good = found.status == "converged"
-    assert good.mean() > 0.6
-    assert np.abs(x[good, 1] - x[good, 0] ** 2).max() < 1e-6 and (x[good, 1] <= 0.2 + 1e-6).all() and (x[good, 0] >= 0.1 - 1e-6).all()
-
-
 def edge() -> NLP:
     """Three half-planes, of which steps that guess what is active go round in circles: the nearest point to (1, 0) is (0, 1/2)."""
     return plane(

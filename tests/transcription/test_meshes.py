@@ -11,7 +11,6 @@ from cases import oscillator, propagated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from problems import Problem, load
 from transcription import DFET, MultipleShooting, PhaseTrajectory, PiecewisePolynomial, Trajectory
@@ -292,21 +291,6 @@ def test_a_density_that_is_the_time_gives_square_roots(cells):
     assert found == pytest.approx(np.sqrt(np.arange(21) / 20), abs=1e-14)
 
 
-def test_two_bells_are_what_scipy_makes_of_them():
-    def f(t):
-        return np.exp(-50 * t**2 + 20 * t - 2) + np.exp(-50 * t**2 + 80 * t - 32)
-
-    def F(t):
-        return quad(f, 0.0, t, epsabs=1e-13, points=[p for p in (0.2, 0.8) if p < t])[0]
-
-    places, whole = np.linspace(0.0, 1.0, 10_001), F(1.0)
-    found = equidistributed(places, continuous(f(places)), 20)
-    exact = [brentq(lambda t, i=i: F(t) - i / 20 * whole, 0.0, 1.0, xtol=1e-13) for i in range(1, 20)]
-    assert found[1:-1] == pytest.approx(exact, abs=1e-7)
-    assert found == pytest.approx(1.0 - found[::-1], abs=1e-12)
-    assert np.diff(found).argmax() in (9, 10), "in the valley between the bells"
-
-
 # Equidistribution
 
 
@@ -319,16 +303,6 @@ def test_intervals_have_equal_shares(density, count):
     whole = share_before(places, values, 1.0)
     for i in (count // 3, count // 2):
         assert share_before(places, values, edges[i]) == pytest.approx(whole * i / count, abs=1e-9 * whole)
-
-
-@given(densities(), st.integers(1, 40), st.floats(1e-6, 1e6), st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
-@settings(max_examples=60, deadline=None)
-def test_units_of_the_density_and_of_time_do_not_matter(density, count, factor, start, length):
-    places, values = density
-    edges = equidistributed(places, values, count)
-    assert equidistributed(places, factor * values, count) == pytest.approx(edges, abs=1e-9)
-    moved = equidistributed(start + length * places, values, count)
-    assert (moved - start) / length == pytest.approx(edges, abs=1e-7 * max(1.0, abs(start) / length))
 
 
 @given(densities(), st.integers(1, 40), st.floats(0.05, 1.0))

@@ -115,12 +115,6 @@ def test_a_hump_is_a_pulse_of_the_same_integral_about_its_middle():
     assert [one.place for one in dip] == pytest.approx([one.place for one in found], abs=0.2 / 64)
 
 
-def test_a_smeared_beginning_and_end_are_switches_near_the_ends():
-    found = switches(*sampled(np.linspace(0, 1, 5), [[0.6, 0.2, 0.0], [0, 0, 0], [0, 0, 0], [0, 0, 0.9]]))
-    assert described(found) == [(UPPER, LOWER), (LOWER, UPPER)]
-    assert found[0].place == pytest.approx(0.25 * 0.8 / 3, rel=0.03) and found[1].place == pytest.approx(1 - 0.25 * 0.3, abs=0.003)
-
-
 def test_an_arc_inside_the_bounds_begins_and_ends():
     edges = np.linspace(0, 1, 11)
     rows = [[1, 1, 1], *([0.3, 0.25, 0.3], [0.35, 0.2, 0.35]) * 3, [0, 0, 0], [0, 0, 0], [0, 0, 0]]
@@ -169,7 +163,7 @@ NOTHING = np.empty(0, dtype=int)
 
 
 def followed(problem, method, rounds=2):
-    """The optimum of the first objective, and those on so many meshes with knots: pairs of objective and trajectory; the last method."""
+    """The first objective's optimum, and those on so many meshes whose edges move: pairs of objective and trajectory; the last method."""
     compiled, point = problem.compile(), optimize(problem, method, starts=1)
     assert point.status == "converged"
     found = [(float(point.F[0]), point.trajectory)]
@@ -239,7 +233,7 @@ def test_a_landing_switches_where_it_should(word):
     assert found[1][0] == pytest.approx(fuel, rel=1e-8)
     for _, flight in found[1:]:
         mesh = method.mesh_of("fall")
-        assert flight["fall"].state.edges[mesh.moving[0]] == pytest.approx(switch, abs=1e-6) and len(mesh.moving) == 1
+        assert flight["fall"].state.edges[mesh.moving[0]] == pytest.approx(switch, abs=1e-7) and len(mesh.moving) == 1
         assert simulate(problem.compile(), flight).max_defect < 1e-9
     assert switched(method, problem, found[2][1]) is None
 
@@ -281,7 +275,7 @@ def test_a_singular_arc_does_not_ring(word):
     assert switched(method, problem, found[2][1]) is None
 
 
-def test_knots_of_several_controls_are_shared_and_those_that_change_nothing_are_none():
+def test_edges_of_several_controls_are_shared_and_those_that_change_nothing_are_none():
     mesh = PhaseMesh.uniform(4, 3)
     found = {
         "u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.7, UPPER, LOWER, 1.0)],
@@ -290,7 +284,7 @@ def test_knots_of_several_controls_are_shared_and_those_that_change_nothing_are_
     assert edge_places(found, {}, mesh, NOTHING) == pytest.approx([0.405, 0.7])
     # Two of one control are not one, however near.
     assert edge_places({"u": [Switch(0.4, LOWER, UPPER, 1.0), Switch(0.401, UPPER, LOWER, 1.0)]}, {}, mesh, NOTHING) == [0.4, 0.401]
-    # A contact beside a switch is this; others have knots of their own.
+    # A contact beside a switch is this; others have edges of their own.
     touching = {"state x": [Switch(0.45, INSIDE, UPPER, 0.5), Switch(0.07, UPPER, INSIDE, 0.5)]}
     assert edge_places(found, touching, mesh, NOTHING) == pytest.approx([0.07, 0.405, 0.7])
     # Near a moving edge they are there; two that were pressed together leave nothing, or one.
@@ -329,12 +323,6 @@ def test_meshes_with_edges_have_them_and_are_as_fine_as_before(widths, places, b
         assert length <= np.diff(edges).max() * (1.5 if few else 2.5) + 1e-12
 
 
-def test_long_arcs_of_constant_controls_have_half_the_elements_and_others_two_more():
-    mesh = with_edges(PhaseMesh.uniform(40, 3), [0.25, 0.35], {"u": [0, 1], "v": [0, 1, 2]})
-    assert np.bincount(mesh.arcs).tolist() == [5, 4, 28]
-    assert np.bincount(with_edges(mesh, [0.25, 0.35], {"u": [0, 1, 2]}).arcs).tolist() == [5, 4, 28]
-
-
 @pytest.mark.parametrize(("wall", "word"), [(0.1, "dfet:8x3:bernstein"), (0.14, "dfet:6x4")])
 def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word):
     """Bryson, Denham and Dreyfus, AIAA Journal 1, 1963: on the wall l from 3 l to 1 - 3 l, effort 4 / (9 l)."""
@@ -347,7 +335,8 @@ def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word
     assert x is not None
     found, method = followed(problem, parse(word), rounds=1)
     exact = 4 / (9 * wall)
-    assert abs(found[0][0] - exact) > 1e-5 and found[1][0] == pytest.approx(exact, rel=3e-6)
+    # Limits of states give way by a part of the tolerance: the effort is less by 1e-6 of itself.
+    assert abs(found[0][0] - exact) > 1e-5 and found[1][0] == pytest.approx(exact, rel=1.5e-6)
     # The effort depends on the places to the third order.
     edges = np.array(method.settled(found[1][1]).mesh_of("move").edges)
     assert edges[list(method.mesh_of("move").moving)] == pytest.approx([3 * wall, 1 - 3 * wall], abs=2e-3)
@@ -390,21 +379,6 @@ def test_edges_begin_at_the_switches_that_they_have_left():
     # At its switch an edge stays exactly.
     _, method, flight = flown((0, 0.5, 1), (1,), [off, full], [0.8], {"u": (0, 1)})
     assert at_switches(method, flight) == method.settled(flight) != method
-
-
-@pytest.mark.parametrize(
-    ("edges", "moving", "values", "places"),
-    [
-        ((0, 0.5, 1), (), [0.0, 3.0], []),  # no moving edge
-        ((0, 0.5, 1), (1,), [3.0, 3.0], [0.5]),  # no switch
-        ((0, 0.3, 0.6, 1), (1,), [0.0, 3.0, 0.0], [0.3]),  # two
-        ((0, 0.1, 0.2, 0.6, 1), (1, 2), [3.0, 3.0, 3.0, 0.0], [0.1, 0.2]),  # one for two edges
-        ((0, 0.1, 0.12, 0.5, 1), (1, 2), [3.0, 3.0, 0.0, 3.0], [0.1, 0.12]),  # beyond the range of the first
-    ],
-)
-def test_edges_that_have_no_switches_stay(edges, moving, values, places):
-    _, method, flight = flown(edges, moving, [[one] * 3 for one in values], places)
-    assert at_switches(method, flight) is None
 
 
 def test_moving_edges_stay_when_elements_are_cut():

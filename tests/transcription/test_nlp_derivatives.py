@@ -146,7 +146,7 @@ def test_a_design_is_derived_once_for_all_points(monkeypatch):
     """Its derivatives are then none of those at points, which take fewer operations."""
 
     def operations() -> int:
-        points = FromPoints(nlp, nlp.parts)._frame.points
+        points = FromPoints(nlp, nlp.parts)._points
         return sum(one.slopes.n_instructions() + one.curvature()[0].n_instructions() for one in points)
 
     nlp = DFET(3, 2).transcribe(designed())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from math import pi
 
 import casadi as ca
 import numpy as np
@@ -255,36 +254,10 @@ def test_where_a_peak_is_infinite_no_solve_begins():
     assert solved.status == "failed" and not solved.begun and not solved.clocked
 
 
-def robot() -> Problem:
-    """A free-flying robot, Sakawa, "Trajectory planning of a free-flying robot by using the optimal control", Optimal Control Applications
-    and Methods 20, 1999; Betts 2010, section 6.13. It begins at rest on the bounds of its place."""
-    problem = Problem("robot")
-    flight = problem.phase("flight", t0=0, tf=12)
-    flight.state("x", bounds=(-10, 10), initial=-10, final=0)
-    flight.state("y", bounds=(-10, 10), initial=-10, final=0)
-    angle = flight.state("angle", bounds=(-pi, pi), initial=pi / 2, final=0)
-    vx, vy = (flight.state(name, bounds=(-2, 2), initial=0, final=0) for name in ("vx", "vy"))
-    turn = flight.state("turn", bounds=(-1, 1), initial=0, final=0)
-    u = [flight.control(f"u{k}", bounds=(0, 1)) for k in range(4)]
-    first, second = u[0] - u[1], u[2] - u[3]
-    push = first + second
-    flight.dynamics(x=vx, y=vy, angle=turn, vx=push * ca.cos(angle), vy=push * ca.sin(angle), turn=0.2 * (first - second))
-    flight.path("first", u[0] + u[1], upper=1)
-    flight.path("second", u[2] + u[3], upper=1)
-    problem.minimize("fuel", flight.integral(u[0] + u[1] + u[2] + u[3]))
-    return problem
-
-
 def solved(problem: Problem, word: str, **more: int) -> Solved:
     nlp = parse(word).nlp(problem)
     middle = np.where(np.isnan(nlp.guess), 0.5 * (nlp.lower + nlp.upper)[nlp.free], nlp.guess)
     return scalarize(nlp, nlp.first_guess(middle[None])[0], reference=np.zeros(1), weights=np.ones(1), **more)
-
-
-def test_a_robot_that_begins_on_its_bounds() -> None:
-    found = solved(robot(), "dfet:20x3:bernstein:1", max_iterations=150)
-    assert found.status == "converged" and found.violation < 1e-7
-    assert found.F[0] > 7.91  # the optimum, Betts 2010: no control on this mesh is better
 
 
 @pytest.mark.parametrize("wide", [1.0, 1e4])

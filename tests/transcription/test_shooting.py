@@ -224,9 +224,11 @@ def test_the_inner_levels_find_feasible_flights(method, inner):
     found = inner_solver(inner).solve(nlp, candidates(nlp, 6))
     assert set(found.status) == {"converged"} and found.violation.max() <= 1e-6
     for z in found.z:
-        assert simulate(nlp.problem, nlp.unpack(z)).max_defect < 1e-2
+        # Of one step of RK4 on each of 12 intervals of 20 s, by 0.0037; two on each of six with constant controls are exact enough.
+        assert simulate(nlp.problem, nlp.unpack(z)).max_defect < (5e-3 if method == SingleShooting(13, control="linear") else 1e-4)
     if inner == "auto":
         other = inner_solver("ipopt").solve(nlp, candidates(nlp, 6))
+        # Newton's steps may end at a point that is a little farther than the nearest one: here by 0.0012 of a span.
         assert found.moved == pytest.approx(other.moved, abs=2e-3)
 
 
@@ -365,24 +367,6 @@ def test_derivatives_of_the_reduced_problem_on_uneven_intervals(kind, nodes):
         moved[1][:, column] -= 1e-6
         slope = (reduced.propagate(moved[0]).values - reduced.propagate(moved[1]).values) / 2e-6
         assert np.allclose(A[:, :, k], slope, atol=2e-8), nlp.variables[column].name
-
-
-def test_each_phase_has_a_mesh_of_its_own():
-    problem = Problem("legs")
-    first, second = problem.phase("first", t0=0, tf=(0.5, 1.5)), problem.phase("second", t0=(0.5, 1.5), tf=2.0)
-    for phase, ends in ((first, {"initial": 0}), (second, {"final": 0})):
-        phase.state("x", bounds=(-2, 3), **({"initial": 0} if phase is first else {"final": 1}))
-        v, u = phase.state("v", bounds=(-5, 5), **ends), phase.control("u", bounds=(-10, 10))
-        phase.dynamics(x=v, v=u)
-    problem.link(first, second)
-    problem.minimize("effort", first.integral(first["u"] ** 2) + second.integral(second["u"] ** 2))
-    method = MultipleShooting(7, control="linear", mesh={"second": (EDGES, 4)})
-    point = optimize(problem, method, starts=1)
-    assert point.status == "converged" and point.verified
-    assert point.objectives["effort"] == pytest.approx(1.5, abs=1e-4), "12 / 2^3, with a control that is a straight line"
-    flight = point.trajectory
-    assert len(flight["first"].state.edges) == 8
-    assert (flight["second"].state.edges - flight["second"].t0) / (2.0 - flight["second"].t0) == pytest.approx(EDGES, abs=1e-12)
 
 
 # Settings

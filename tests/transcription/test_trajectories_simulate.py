@@ -10,7 +10,6 @@ from cases import candidates, decay, integrator, oscillator, solved
 from problems import Problem, load
 from transcription import DFET, PiecewisePolynomial, Trajectory
 from transcription.inner import inner_solver
-from transcription.trajectories import arcs
 from transcription.trajectories.limits import excursions
 from transcription.trajectories.simulate import simulate, simulate_all
 
@@ -115,33 +114,7 @@ def test_linked_phases_are_simulated_from_where_the_first_ended():
     assert other.defect["leg 1"]["x"] > 1e-3 and other.violations["constraint 'drop'"] > 1e-3
 
 
-def test_a_phase_of_no_duration_is_simulated():
-    problem = Problem("coast")
-    burn = problem.phase("burn", t0=0, tf=(1, 3))
-    burn.state("x", bounds=(-10, 10), initial=0)
-    burn.dynamics(x=1)
-    coast = problem.phase("coast", t0=(1, 3), tf=(1, 3))
-    coast.state("x", bounds=(-10, 10))
-    coast.dynamics(x=2)
-    problem.link(burn, coast)
-    problem.minimize("end", coast.final(coast["x"]) + coast.integral(coast["x"]))
-    nlp = DFET(2, 2).transcribe(problem)
-    check = simulated(nlp, nlp.propagate(nlp.first_guess(np.array([[2.0, 2.0]])))[0])
-    assert check.max_defect < 1e-12 and check.violation == 0 and check.objectives["end"] == pytest.approx(2)
-
-
 # Trouble
-
-
-@pytest.mark.slow
-def test_what_is_too_stiff_for_an_explicit_method_is_simulated_by_an_implicit_one(monkeypatch):
-    """x' = a (u - x), which follows u within 1/a."""
-    monkeypatch.setattr(arcs, "MOST_CALLS", 2000)
-    nlp = DFET(2, 1).transcribe(linear(a=-1e5, b=1e5))
-    for rows in (1, 3):
-        z = np.tile(nlp.first_guess(np.full((1, len(nlp.free)), 0.4)), (rows, 1))
-        for check in simulate_all(nlp.problem, [nlp.unpack(one) for one in z]):
-            assert check.trajectory["run"].states[-1, 0] == pytest.approx(0.4, abs=1e-6)
 
 
 @pytest.mark.parametrize(("a", "finite"), [(300.0, True), (1000.0, False)])

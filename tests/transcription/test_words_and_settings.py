@@ -11,11 +11,9 @@ from cases import oscillator
 from euler import Euler
 
 from problems import load
-from transcription import DFET, Collocation, MultipleShooting, SingleShooting, Smooth, Trajectory, from_dict, parse, word
-from transcription.inner import Auto, Ipopt, Newton, inner_solver
-from transcription.nlp.scalarized import scalarize
+from transcription import DFET, Collocation, MultipleShooting, SingleShooting, Smooth, from_dict, parse, word
+from transcription.inner import Auto, Ipopt, Newton
 from transcription.phases.mesh import PhaseMesh
-from transcription.trajectories.simulate import simulate
 
 UNEVEN = (0.0, 0.1, 0.35, 0.9, 1.0)
 WORDS = {
@@ -144,27 +142,3 @@ def swing(*mesh: object) -> DFET:
 def test_what_is_no_method_is_refused_in_the_users_words(make, message):
     with pytest.raises(ValueError, match=message):
         make()
-
-
-def test_what_is_computed_is_shown_in_a_line():
-    problem = oscillator()
-    nlp = DFET(3, 2).transcribe(problem)
-    found = inner_solver("propagate").solve(nlp, 0.5 * (nlp.lower + nlp.upper)[nlp.free][None].repeat(2, axis=0))
-    trajectory = nlp.unpack(found.z[0])
-    solved = scalarize(nlp, found.z[0], reference=np.zeros(2), weights=np.ones(2), max_iterations=1)
-    shown = {
-        problem: ["oscillator", "swing", "cost"],
-        problem.compile(): ["oscillator", "swing", "cost"],
-        problem.compile().phases[0]: ["swing", "x, y", "u, v"],
-        nlp: ["oscillator", "DFET(elements=3, order=2)", f"{len(nlp.free)} free"],
-        found: ["2 candidates: 2 converged"],
-        trajectory["swing"]: ["swing", "13 nodes on 3 elements", "x, y, u, v"],
-        trajectory["swing"].state: ["2 of degree 4 on 3 elements"],
-        simulate(nlp.problem, trajectory): ["max_defect=", "violation=", "'cost': "],
-        solved: [solved.status, "violation="],
-    }
-    for one, words in [*shown.items(), (trajectory, ["'swing' 0.25 to", "m=1.25"])]:
-        text = repr(one)
-        assert "\n" not in text and len(text) < 200 and text.startswith(type(one).__name__), text
-        assert all(word in text for word in words), text
-    assert isinstance(trajectory, Trajectory) and repr(load("goddard")).startswith("Problem('goddard'")

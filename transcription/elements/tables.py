@@ -9,6 +9,13 @@ import numpy as np
 
 from ..numerics import polynomials
 
+POINTS = ("radau", "gauss", "lobatto", "chebyshev")
+"""Kinds of points; all but those of Gauss have the left end among them, and Lobatto's and Chebyshev's the right end, too."""
+BASES = {"radau": "radau", "gauss": "legendre", "lobatto": "lobatto", "chebyshev": "chebyshev"}
+"""The Lagrange polynomials on them, which are those of the controls."""
+CLOSED = {"radau": "closed-radau", "gauss": "closed-legendre", "lobatto": "lobatto", "chebyshev": "chebyshev"}
+"""The Lagrange polynomials on them and both ends, which are those of the states."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tables:
@@ -86,10 +93,8 @@ class Tables:
 def dfet_tables(order: int, control_order: int, basis: str) -> Tables:
     """The element of states of degree l = `order` and controls of degree q, tested with functions of degree l + 1.
 
-    Dynamics are evaluated at max(l, q) + 1 Gauss-Legendre nodes. The first l + 1 tests, solved for the states' coefficients, give these
-    from the rates there. The trajectory is the collocation polynomial of the (l + 1)-stage Gauss-Legendre Runge-Kutta method that is
-    equivalent for q <= l: through the states at its stages and at both ends. It is more accurate by one order than the states' own
-    polynomial of degree l.
+    Dynamics are evaluated at max(l, q) + 1 Gauss-Legendre nodes; the first l + 1 tests give the states' coefficients. The trajectory is the
+    collocation polynomial of the (l + 1)-stage Gauss method that is equivalent for q <= l, of one order more than that of degree l.
     """
     tau, weights = polynomials.gauss_legendre(max(order, control_order) + 1)
     stages, tests = polynomials.gauss_legendre(order + 1)[0], order + 2
@@ -121,14 +126,6 @@ def dfet_tables(order: int, control_order: int, basis: str) -> Tables:
         costate_basis=basis,
         costates=np.eye(tests),
     )
-
-
-POINTS = ("radau", "gauss", "lobatto", "chebyshev")
-"""Kinds of points; all but those of Gauss have the left end among them, and Lobatto's and Chebyshev's the right end, too."""
-BASES = {"radau": "radau", "gauss": "legendre", "lobatto": "lobatto", "chebyshev": "chebyshev"}
-"""The Lagrange polynomials on them, which are those of the controls."""
-CLOSED = {"radau": "closed-radau", "gauss": "closed-legendre", "lobatto": "lobatto", "chebyshev": "chebyshev"}
-"""The Lagrange polynomials on them and both ends, which are those of the states."""
 
 
 def control_degree(points: str, degree: int) -> int:
@@ -171,10 +168,9 @@ def collocation_tables(points: str, degree: int, control_order: int, bernstein: 
 def _tested(tau: np.ndarray, weights: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Balance, test and costates of Gauss's or Radau's points.
 
-    The differential form D X = h/2 f at the points is multiplied by test polynomials, of which there are as many as equations, summed with
-    the weights, and integrated by parts, which is exact for these quadratures. The tests are the Lagrange polynomials on the points, for
-    Radau's without the last one, and 1: so the right end enters one equation only, and the multipliers are values of the costates there.
-    They are those of the covector mapping of the differential form: its multipliers over the weights.
+    The differential form D X = h/2 f is multiplied by the Lagrange polynomials on the points, for Radau's without the last one, and 1, and
+    integrated by parts, exactly: so the right end enters one equation only, and multipliers are costates at these points, those of the
+    covector mapping of the differential form.
     """
     radau = tau[0] == -1.0
     of_tests = np.append(tau[:-1] if radau else tau, 1.0)

@@ -19,6 +19,10 @@ from ..stopping import Stopped, stopping
 from .base import InnerResult, InnerSolver, evaluation_work, propagation_work, scored, started
 from .newton import Newton
 
+PROJECTION_ITERATIONS = 150
+"""Most iterations of a projection, and of each further try, for what Newton's method leaves: most that succeed take some tens, and those
+that fail take all."""
+
 
 @dataclass(frozen=True)
 class Ipopt(InnerSolver):
@@ -117,11 +121,6 @@ def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[Watched, np.n
     return Watched("inner", parts, options), *scaled_bounds(nlp)
 
 
-PROJECTION_ITERATIONS = 150
-"""Most iterations of a projection, and of each further try, for what Newton's method leaves: most that succeed take some tens, and those
-that fail take all."""
-
-
 @dataclass(frozen=True)
 class Projection(InnerSolver):
     """Newton's method over propagated states, and a projection by IPOPT of what it leaves infeasible."""
@@ -187,6 +186,7 @@ NAMED: dict[str, InnerSolver] = {
     "ipopt": Ipopt(),
     "ipopt-feasibility": Ipopt(objective="constant"),
 }
+"""Those of the literature are among them: "ipopt-feasibility" of MACS's paper, "none" of population searches on collocation."""
 
 
 def inner_solver(inner: str | InnerSolver) -> InnerSolver:

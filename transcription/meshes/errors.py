@@ -127,9 +127,8 @@ def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, simulated: PhaseT
 
 def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shares (N,) in the error of integrals, and `PhaseErrors.integrand_rate`."""
-    s = np.array([trajectory.t0, trajectory.tf, *parameters])
     nodes = trajectory.state.coefficients.shape[1]
-    (few, _), (many, values) = (_integrals(phase, trajectory, s, count) for count in (nodes, 2 * nodes + 4))
+    (few, _), (many, values) = (_integrals(phase, trajectory, parameters, count) for count in (nodes, 2 * nodes + 4))
     total = np.abs(many).sum(axis=0)
     error = (np.abs(few - many) / np.where(total > 0, total, 1.0)).max(axis=1, initial=0.0)
     error = np.where(np.isfinite(error), error, 0.0)
@@ -140,13 +139,8 @@ def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: n
 
 def _peak_shares(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> np.ndarray:
     """Shares (N,) in the error of peaks."""
-    s = np.array([trajectory.t0, trajectory.tf, *parameters])
-    times = trajectory.state.times(DENSE)
-    x, u = (
-        values.reshape(times.size, values.shape[2])
-        for values in (trajectory.state.on_elements(DENSE), trajectory.controls_on_elements(DENSE))
-    )
-    between = paths_and_peaks(phase, x, u, times.ravel(), s)[1].reshape(*times.shape, -1)
+    x, u, times, s = trajectory.sampled(DENSE, parameters)
+    between = paths_and_peaks(phase, x, u, times, s)[1].reshape(len(trajectory.state.edges) - 1, len(DENSE), -1)
     at_nodes = paths_and_peaks(phase, trajectory.states, trajectory.controls, trajectory.time, s)[1]
     higher = np.maximum(between.max(axis=1) - at_nodes.max(axis=0), 0.0) / np.maximum(np.abs(at_nodes).max(axis=0), np.finfo(float).tiny)
     return _shares(np.nan_to_num(higher.max(axis=1, initial=0.0)))
@@ -156,13 +150,12 @@ def _shares(errors: np.ndarray) -> np.ndarray:
     return errors / max(errors.sum(), np.finfo(float).tiny)
 
 
-def _integrals(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+def _integrals(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     """Integrals (N, k) over each element by Gauss-Legendre's rule, and the integrands (N, nodes, k) there."""
     lengths = np.diff(trajectory.state.edges)
     tau, weights = gauss_legendre(nodes)
-    times = trajectory.state.times(tau)
-    x, u = (values.reshape(times.size, -1) for values in (trajectory.state.on_elements(tau), trajectory.controls_on_elements(tau)))
-    values = np.array(phase.integrands(x.T, u.T, times.reshape(1, -1), s)).reshape(-1, *times.shape)
+    x, u, times, s = trajectory.sampled(tau, parameters)
+    values = np.array(phase.integrands(x.T, u.T, times[None], s)).reshape(-1, len(lengths), nodes)
     return (0.5 * lengths[:, None] * values @ weights).T, np.moveaxis(values, 0, 2)
 
 

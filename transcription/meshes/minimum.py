@@ -77,13 +77,9 @@ def _gain(
     phase: CompiledPhase, trajectory: PhaseTrajectory, costates: PiecewisePolynomial, weights: np.ndarray, parameters: np.ndarray
 ) -> Gain:
     """What the controls of one phase could gain, from its costates and the weights of its integrands."""
-    times, shape = trajectory.state.times(TAU), (len(trajectory.state.edges) - 1, len(TAU))
-    x, u, adjoint = (
-        values.reshape(times.size, -1)
-        for values in (trajectory.state.on_elements(TAU), trajectory.controls_on_elements(TAU), costates.on_elements(TAU))
-    )
-    s = np.array([trajectory.t0, trajectory.tf, *parameters])
-    t = times.ravel()
+    shape = len(trajectory.state.edges) - 1, len(TAU)
+    x, u, t, s = trajectory.sampled(TAU, parameters)
+    adjoint = costates.on_elements(TAU).reshape(len(t), -1)
 
     def under(controls: np.ndarray) -> np.ndarray:
         return hamiltonian(phase, adjoint, weights, x, controls, t, s)
@@ -92,9 +88,10 @@ def _gain(
     highest = peaks.max(axis=0)
     clear = _clear(phase, x, paths, peaks, highest)
     best, least = np.zeros(len(t)), u.copy()
+    lower, upper = (np.array([getattr(limit, side) for limit in phase.paths]) for side in ("lower", "upper"))
     for controls in _others(phase, u):
         values, (limited, raised) = under(controls), paths_and_peaks(phase, x, controls, t, s)
-        allowed = _within(phase, limited) & (raised <= highest).all(axis=1)
+        allowed = ((lower <= limited) & (limited <= upper)).all(axis=1) & (raised <= highest).all(axis=1)
         better = allowed & (own - values > best)
         best[better], least[better] = (own - values)[better], controls[better]
     rates = np.where(clear & np.isfinite(own), best, 0.0).reshape(shape)
@@ -119,12 +116,6 @@ def _others(phase: CompiledPhase, u: np.ndarray) -> list[np.ndarray]:
     if 1 < len(lower) <= 4:
         found += [np.tile(corner, (len(u), 1)) for corner in product(*zip(lower, upper, strict=True))]
     return found
-
-
-def _within(phase: CompiledPhase, paths: np.ndarray) -> np.ndarray:
-    """Mask (k,) of the places at which all path constraints are satisfied."""
-    lower, upper = (np.array([getattr(limit, side) for limit in phase.paths]) for side in ("lower", "upper"))
-    return np.all((paths >= lower) & (paths <= upper), axis=1)
 
 
 def _clear(phase: CompiledPhase, x: np.ndarray, paths: np.ndarray, peaks: np.ndarray, highest: np.ndarray) -> np.ndarray:

@@ -220,15 +220,11 @@ def _without(parts: Sequence[Stretch], places: np.ndarray, labels: Sequence[int]
 
 
 def switched(method: Method, problem: Problem | CompiledProblem, trajectory: Trajectory) -> Method | None:
-    """The next method to try, on meshes whose edges lie at the switches of a trajectory's controls, and move.
+    """The next method to try, on meshes whose edges lie at the switches of a trajectory's controls, and move; None if there is none.
 
-    First, each control is constant on each arc on which it is on a bound. A control that is free there has local optima of its own, in
-    which it leaves its bound gradually while the edge stays behind. Called again with what that method found: the switches that came or
-    went, and edges that could move no further, begin anew; once they stay, all controls are free, so that an arc on which none should be
-    constant shows. Called with what that method found: None, unless there are other switches now.
-
-    Controls stay within their bounds between nodes, too. Elements between the switches are as fine as before, or finer, and fewer where all
-    controls are on bounds. Not every proposal is better: compare.
+    First, controls are constant on arcs on which they are on a bound: one that is free there has local optima in which it leaves its bound
+    gradually while the edge stays behind. Called again with what that method found, switches that came or went, and edges that could move
+    no further, begin anew; once they stay, all controls are free. Not every proposal is better: compare.
     """
     if not method.moves_edges:
         return None

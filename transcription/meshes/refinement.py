@@ -156,6 +156,24 @@ def redistributed(method: Method, problem: CompiledProblem, trajectory: Trajecto
     return found
 
 
+def next_intervals(
+    old: PhaseMesh, phase: PhaseTrajectory, errors: np.ndarray, of_controls: np.ndarray, degree: int, least: float, most: int
+) -> PhaseMesh:
+    """The next mesh of a phase, by its density: more intervals where errors (N,) ask for it, or where nothing is wrong."""
+    places, values = trajectory_density(phase)
+    right = max(errors.max(initial=0.0), of_controls.max(initial=0.0)) <= 1.0
+    count = min(max(most, old.elements), int(np.ceil(1.5 * old.elements))) if right else old.elements
+    curved = count * raised(places, values, least)
+    # Errors of a step fall with the order and one more, those of controls of this degree twice as fast as their last coefficient.
+    shorter = np.maximum(errors ** (1.0 / (old.order + 1)), of_controls ** (0.5 / max(degree, 1)))
+    # A step that is too long becomes somewhat shorter than that, but no more than four times: its error says little about finer meshes.
+    shorter = np.minimum(np.nan_to_num(np.where(shorter > 1.0, 1.25 * shorter, shorter), nan=4.0), 4.0)
+    needed = shorter / np.diff(places)
+    density = np.maximum(curved, (needed * old.elements / (len(places) - 1))[:, None])
+    count = max(count, min(most, int(np.ceil(integrals(places, density)[-1] - 1e-9))))
+    return PhaseMesh(tuple(equidistributed(places, density, count).tolist()), old.order)
+
+
 def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
     """The method with elements cut where other controls would gain: where these jump, else in the middle; no edge moves."""
     finer = {}

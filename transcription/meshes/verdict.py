@@ -17,40 +17,6 @@ from .errors import PhaseErrors, phase_errors, state_scales
 from .minimum import Gain, OptimumMultipliers, gains
 
 
-def growth(problem: CompiledProblem, trajectory: Trajectory) -> float:
-    """The largest factor by which an error of a state, in scales, grows on its way through a phase, to first order; at least 1."""
-    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
-    return max(_phase_growth(phase, trajectory[phase.name], parameters) for phase in problem.phases)
-
-
-def _phase_growth(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> float:
-    transitions = _transitions(phase, trajectory, parameters)
-    if not np.isfinite(transitions).all():
-        return np.inf
-    largest, reached = 1.0, np.eye(transitions.shape[1])[None]
-    for one in transitions:
-        # From the beginnings of all elements so far to the end of this one.
-        reached = one @ reached
-        largest = max(largest, float(np.abs(reached).sum(axis=2).max()))
-        if largest > 1e100:
-            return np.inf
-        reached = np.concatenate([reached, np.eye(transitions.shape[1])[None]])
-    return largest
-
-
-def _transitions(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> np.ndarray:
-    """Derivatives (N, nx, nx) of the states at the ends of the elements by those at their beginnings, in scales."""
-    elements, nx = len(trajectory.state.coefficients), len(phase.states)
-    scales, nothing = state_scales(trajectory), np.zeros((elements * (nx + 1), phase.integrands.size1_out(0)))
-    rtol, step = 1e-11, 1e-6  # a state is changed, in scales, by about the root of what the integrator resolves
-    changed = np.vstack([np.zeros(nx), step * np.diag(scales)])
-    starts = (trajectory.edge_states[:-1, None] + changed).reshape(-1, nx)
-    arcs = Arcs.of(phase, [(trajectory, j, parameters) for j in range(elements) for _ in range(nx + 1)])
-    tolerances = 0.1 * rtol * np.concatenate([scales, np.ones(nothing.shape[1])])
-    ends = arcs.integrate(np.hstack([starts, nothing]), rtol, tolerances, "DOP853")[:, -1, :nx].reshape(elements, nx + 1, nx)
-    return ((ends[:, 1:] - ends[:, :1]) / (step * scales)).swapaxes(1, 2)
-
-
 @dataclass(frozen=True)
 class Wanted:
     """What is good enough."""
@@ -262,3 +228,35 @@ def _missed(problem: CompiledProblem, simulation: Simulation, F: np.ndarray, uni
 def simulated_objectives(problem: CompiledProblem, simulation: Simulation) -> np.ndarray:
     """The objectives (m,) of a simulation, all minimised."""
     return np.array([simulation.objectives[goal.name] for goal in problem.goals]) * problem.signs
+
+
+def growth(problem: CompiledProblem, trajectory: Trajectory) -> float:
+    """The largest factor by which an error of a state, in scales, grows on its way through a phase, to first order; at least 1."""
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    largest = 1.0
+    for phase in problem.phases:
+        transitions = _transitions(phase, trajectory[phase.name], parameters)
+        if not np.isfinite(transitions).all():
+            return np.inf
+        reached = np.eye(len(phase.states))[None]
+        for one in transitions:
+            # From the beginnings of all elements so far to the end of this one.
+            reached = one @ reached
+            largest = max(largest, float(np.abs(reached).sum(axis=2).max()))
+            if largest > 1e100:
+                return np.inf
+            reached = np.concatenate([reached, np.eye(len(phase.states))[None]])
+    return largest
+
+
+def _transitions(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> np.ndarray:
+    """Derivatives (N, nx, nx) of the states at the ends of the elements by those at their beginnings, in scales."""
+    elements, nx = len(trajectory.state.coefficients), len(phase.states)
+    scales, nothing = state_scales(trajectory), np.zeros((elements * (nx + 1), phase.integrands.size1_out(0)))
+    rtol, step = 1e-11, 1e-6  # a state is changed, in scales, by about the root of what the integrator resolves
+    changed = np.vstack([np.zeros(nx), step * np.diag(scales)])
+    starts = (trajectory.edge_states[:-1, None] + changed).reshape(-1, nx)
+    arcs = Arcs.of(phase, [(trajectory, j, parameters) for j in range(elements) for _ in range(nx + 1)])
+    tolerances = 0.1 * rtol * np.concatenate([scales, np.ones(nothing.shape[1])])
+    ends = arcs.integrate(np.hstack([starts, nothing]), rtol, tolerances, "DOP853")[:, -1, :nx].reshape(elements, nx + 1, nx)
+    return ((ends[:, 1:] - ends[:, :1]) / (step * scales)).swapaxes(1, 2)

@@ -35,7 +35,8 @@ def integral_weights(
     of_objectives: np.ndarray,
     of_constraints: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """What a unit of each integral (nq,) counts in the sum of objectives and constraints, each times its multiplier; by phase."""
+    """What a unit of each integral (nq,) counts in the sum of objectives and constraints, each times its multiplier; by phase.
+    quantities: a column q a phase, as `NLP.quantities` gives them."""
     slopes = _slopes(problem).call([*quantities, parameters, of_objectives, of_constraints])
     found = {}
     for phase, slope in zip(problem.phases, slopes, strict=True):
@@ -57,6 +58,7 @@ def _slopes(problem: CompiledProblem) -> ca.Function:
 def costates(nlp: NLP, z: np.ndarray, found: Multipliers, *, swept: bool = False) -> Costates | None:
     """The costates of a vector (n,) that is optimal, from its multipliers; None where they are no numbers.
 
+    The weights of the objectives are those multipliers over their sum, so that they are of the objectives' own units.
     `swept`: by the adjoint equation, backward from tf, also where the multipliers of the method are costates themselves.
     """
     z = np.asarray(z, dtype=float)

@@ -21,7 +21,7 @@ from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..phases.writer import DYNAMICS
 from ..stopping import Stopped, check_stopping, stopping
 from .derivatives import gradients, hessian
-from .program import STATUS_OF_IPOPT, Watched, back_in_bounds, ipopt_options, multiplied, origin, scaled_bounds
+from .program import STATUS_OF_IPOPT, Watched, back_in_bounds, derivatives_of_program, ipopt_options, multiplied, origin, scaled_bounds
 from .scalarized import SOLVE, SOLVED, Solved, not_begun
 
 
@@ -102,15 +102,9 @@ def _program(nlp: NLP, seconds: float, max_iterations: int) -> Watched:
     values = g * rows - up + down
     check_stopping()
     jacobian = ca.horzcat(multiplied(gradients(nlp)(z)[1], rows, scale), -ca.MX.eye(r), ca.MX.eye(r))
-    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", r)
+    lam_g = ca.MX.sym("lam_g", r)
     curvature = multiplied(hessian(nlp)(z, ca.MX(len(nlp.problem.goals), 1), lam_g * rows), scale, scale)
-    curvature = ca.diagcat(curvature, ca.MX(2 * r, 2 * r))
-    derivatives = {
-        "jac_g": ca.Function("jac_g", [x, ca.MX(0, 1)], [values, jacobian], ["x", "p"], ["g", "jac_g_x"]),
-        "hess_lag": ca.Function(
-            "hess_lag", [x, ca.MX(0, 1), lam_f, lam_g], [curvature], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
-        ),
-    }
+    derivatives = derivatives_of_program(x, ca.MX(0, 1), (values, jacobian), lam_g, ca.diagcat(curvature, ca.MX(2 * r, 2 * r)))
     options = ipopt_options(seconds, max_iterations)
     options |= {"ipopt.tol": SOLVE.accuracy, "ipopt.nlp_scaling_method": "none", "ipopt.bound_relax_factor": 0.0, "ipopt.mu_init": 0.1}
     return Watched("elastic", {"x": x, "f": ca.sum1(up) + ca.sum1(down), "g": values}, options | derivatives)

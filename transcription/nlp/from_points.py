@@ -26,10 +26,10 @@ class FromPoints:
 
     def __init__(self, nlp: NLP, parts: Parts) -> None:
         self.z = ca.MX.sym("z", len(nlp.variables))
-        self._frame = frame = _framed(parts, self.z)
+        self._A: ca.DM | ca.MX
+        self._A, every = self._prepare(parts)
         self._inputs, self._shared = list[tuple[ca.MX, ca.MX]](), list[tuple[ca.MX, _Common]]()
-        self._A: ca.DM | ca.MX = frame.A
-        for one, common, y in zip(frame.points, frame.common, parts.inputs.call([self.z]), strict=True):
+        for one, common, y in zip(self._points, every, parts.inputs.call([self.z]), strict=True):
             v = y[one.vary, :]
             if common is not None:
                 p = y[common.of, 0]
@@ -38,26 +38,58 @@ class FromPoints:
                 self._A = self._A + _product(common.to, _product(slopes, common.A))
                 self._shared.append((p, common))
             self._inputs.append((v, y[one.fixed, :]))
-        found = [one.slopes.map(v.shape[1])(v, rest) for one, (v, rest) in zip(frame.points, self._inputs, strict=True)]
+        found = [one.slopes.map(v.shape[1])(v, rest) for one, (v, rest) in zip(self._points, self._inputs, strict=True)]
         self.rows, self.q = parts.affine.call([self.z, *(w for w, _ in found)])
-        self._slopes = ca.MX(frame.slopes, ca.veccat(*(slopes for _, slopes in found)))
+        self._slopes = ca.MX(self._blocks, ca.veccat(*(slopes for _, slopes in found)))
         self._values_by_z = _product(self._slopes, self._A)
+
+    def _prepare(self, parts: Parts) -> tuple[ca.DM, list[_Common | None]]:
+        """What is known before z is: derivatives A by z of all inputs that vary, at all points, and what each Function has in common."""
+        inputs = parts.inputs.call([self.z], True, False)
+        A = ca.vertsplit(_constant(ca.veccat(*inputs), self.z), np.cumsum([0, *(y.numel() for y in inputs)]).tolist())
+        begins = parts.inputs.call([ca.DM.zeros(self.z.numel())])
+        points, varying, sparsities, alike = [], [], [], []
+        for function, y, begin, by_z in zip(parts.points, inputs, begins, A, strict=True):
+            size, k = y.shape
+            vary = np.unique(np.array(by_z.sparsity().row(), dtype=int) % size)
+            alike.append(np.intersect1d(vary, _alike(ca.horzcat(by_z, ca.vec(begin)), size)))
+            points.append(one := _Point(function, vary, alike[-1]))
+            sparsities.append((one.sparsity, k))
+            rows = by_z[(vary[None] + size * np.arange(k)[:, None]).ravel().tolist(), :]
+            if one.u:
+                none = ca.DM(one.count - len(vary), self.z.numel())
+                rows = ca.vertcat(*(part for own in ca.vertsplit(rows, len(vary)) for part in (own, none)))
+            varying.append(rows)
+        sizes = [rows.shape[0] for rows in varying]
+        common = [
+            _common(one, own, by_z[own.tolist(), :], before, sum(sizes), k)
+            for one, own, by_z, before, (_, k) in zip(points, alike, A, np.cumsum([0, *sizes[:-1]]), sparsities, strict=True)
+        ]
+        values = [ca.MX.sym("w", *parts.affine.size_in(i + 1)) for i in range(len(points))]
+        joined = ca.MX.sym("w", sum(value.numel() for value in values))
+        split = ca.vertsplit(joined, np.cumsum([0, *(value.numel() for value in values)]).tolist())
+        values = [ca.reshape(one, *value.shape) for one, value in zip(split, values, strict=True)]
+        L, q = parts.affine.call([self.z, *values], True, False)
+        rows, quantities = ((_constant(one, self.z, joined), _constant(one, joined, self.z)) for one in (L, q))
+        self._points, self._of_rows, self._of_quantities, self._blocks = points, rows, quantities, _diagonal(sparsities)
+        self._scores, self._curvature, self._curved = _curved(parts.scores)
+        return ca.vertcat(*varying), common
 
     def gradients(self) -> list[ca.MX]:
         """dF/dz, dg/dz, F and g."""
-        F, c, dF, dc = self._frame.scores(self.q)
-        rows = self._by_z(self._frame.rows)
+        F, c, dF, dc = self._scores(self.q)
+        rows = self._by_z(self._of_rows)
         return [self._along(dF), ca.vertcat(rows, self._along(dc)), F, ca.vertcat(self.rows, c)]
 
     def hessian(self, of_F: ca.MX, of_g: ca.MX) -> ca.MX:
         """The upper triangle of the Hessian of of_F'F + of_g'g."""
-        frame, count = self._frame, self.rows.numel()
+        count = self.rows.numel()
         of_rows, of_scores = of_g[:count], ca.vertcat(of_F, of_g[count:])
-        _, _, dF, dc = frame.scores(self.q)
+        _, _, dF, dc = self._scores(self.q)
         of_q = _product(ca.vertcat(dF, dc).T, of_scores)
-        of_values = ca.densify(_product(frame.rows[1].T, of_rows) + _product(frame.quantities[1].T, of_q))
+        of_values = ca.densify(_product(self._of_rows[1].T, of_rows) + _product(self._of_quantities[1].T, of_q))
         first, halves, sparsities = 0, [], []
-        for one, (v, rest) in zip(frame.points, self._inputs, strict=True):
+        for one, (v, rest) in zip(self._points, self._inputs, strict=True):
             curvature, sparsity = one.curvature()
             size, k = curvature.size1_in(2), v.shape[1]
             halves.append(curvature.map(k)(v, rest, ca.reshape(of_values[first : first + size * k], size, k)))
@@ -67,15 +99,15 @@ class FromPoints:
         for p, common in self._shared:
             of_u = ca.densify(_product(_product(self._slopes, common.to).T, of_values))
             H += _product(common.A.T, _product(common.curvature(p, of_u), common.A))
-        if frame.curved:
-            q = self._by_z([part[frame.curved, :] for part in frame.quantities])
-            H += _product(q.T, _product(frame.curvature(self.q, of_scores), q))
+        if self._curved:
+            q = self._by_z([part[self._curved, :] for part in self._of_quantities])
+            H += _product(q.T, _product(self._curvature(self.q, of_scores), q))
         return ca.triu(H + H.T)
 
     def _along(self, by_q: ca.MX) -> ca.MX:
         """The derivatives by z of what has these by the quantities."""
         used = np.flatnonzero(np.diff(by_q.sparsity().colind())).tolist()
-        return _product(by_q[:, used], self._by_z([part[used, :] for part in self._frame.quantities]))
+        return _product(by_q[:, used], self._by_z([part[used, :] for part in self._of_quantities]))
 
     def _by_z(self, slopes: Sequence[ca.DM]) -> ca.MX:
         """The derivatives by z of what has these by z and by the values at the points."""
@@ -118,51 +150,6 @@ class _Point:
         H: Any = ca.triu(ca.hessian(ca.dot(of_w, self._values), v)[0])
         H *= ca.DM(H.sparsity(), np.where(np.equal(*H.sparsity().get_triplet()), 0.5, 1.0))
         return ca.Function("curvature", [v, rest, of_w], [H.nz[:]]), H.sparsity()
-
-
-@dataclass(frozen=True, eq=False)
-class _Frame:
-    """What of the derivatives of an NLP is known before z is."""
-
-    points: list[_Point]
-    common: list[_Common | None]  # of each of these
-    A: ca.DM  # derivatives by z of all inputs that vary, at all points
-    slopes: ca.Sparsity  # of the Jacobians at all points
-    rows: tuple[ca.DM, ca.DM]  # rows, quantities: Derivatives of L and of q by z and by the values at all points
-    quantities: tuple[ca.DM, ca.DM]
-    scores: ca.Function  # q -> (F, c, dF/dq, dc/dq)
-    curvature: ca.Function  # (q, of_scores) -> half of the Hessian of of_scores'(F, c) by those quantities that are `curved`
-    curved: list[int]
-
-
-def _framed(parts: Parts, z: ca.MX) -> _Frame:
-    inputs = parts.inputs.call([z], True, False)
-    A = ca.vertsplit(_constant(ca.veccat(*inputs), z), np.cumsum([0, *(y.numel() for y in inputs)]).tolist())
-    begins = parts.inputs.call([ca.DM.zeros(z.numel())])
-    points, varying, sparsities, alike = [], [], [], []
-    for function, y, begin, by_z in zip(parts.points, inputs, begins, A, strict=True):
-        size, k = y.shape
-        vary = np.unique(np.array(by_z.sparsity().row(), dtype=int) % size)
-        alike.append(np.intersect1d(vary, _alike(ca.horzcat(by_z, ca.vec(begin)), size)))
-        points.append(one := _Point(function, vary, alike[-1]))
-        sparsities.append((one.sparsity, k))
-        rows = by_z[(vary[None] + size * np.arange(k)[:, None]).ravel().tolist(), :]
-        if one.u:
-            none = ca.DM(one.count - len(vary), z.numel())
-            rows = ca.vertcat(*(part for own in ca.vertsplit(rows, len(vary)) for part in (own, none)))
-        varying.append(rows)
-    sizes = [rows.shape[0] for rows in varying]
-    common = [
-        _common(one, own, by_z[own.tolist(), :], before, sum(sizes), k)
-        for one, own, by_z, before, (_, k) in zip(points, alike, A, np.cumsum([0, *sizes[:-1]]), sparsities, strict=True)
-    ]
-    values = [ca.MX.sym("w", *parts.affine.size_in(i + 1)) for i in range(len(points))]
-    joined = ca.MX.sym("w", sum(value.numel() for value in values))
-    split = ca.vertsplit(joined, np.cumsum([0, *(value.numel() for value in values)]).tolist())
-    values = [ca.reshape(one, *value.shape) for one, value in zip(split, values, strict=True)]
-    L, q = parts.affine.call([z, *values], True, False)
-    rows, quantities = ((_constant(one, z, joined), _constant(one, joined, z)) for one in (L, q))
-    return _Frame(points, common, ca.vertcat(*varying), _diagonal(sparsities), rows, quantities, *_curved(parts.scores))
 
 
 def _alike(rows: ca.DM, size: int) -> np.ndarray:

@@ -133,12 +133,10 @@ class Conditions:
 
     @cached_property
     def scaled(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Multipliers (used,) of the objectives and (k,) of the inequalities, in units, that leave the least residual; None where none are
-        found.
+        """Multipliers (used,) of objectives and (k,) of inequalities, in units, of the least residual; None where none are found.
 
-        Where limits depend on each other, as do those of a state along an arc on one, or of a mass and of the thrust while it is off, they
-        are not unique, and round-off would choose among them. The smallest are taken, and of limits of free variables rather than others:
-        first the weights of the objectives, and then the multipliers that belong to them.
+        Where limits depend on each other they are not unique, and round-off would choose: the smallest are taken, and of limits of free
+        variables rather than others, first the weights of the objectives, then the multipliers that belong to them.
         """
         m, slack, small = len(self.linear.of_objectives), self.linear.slack, SMALL_MULTIPLIERS * np.concatenate(self._others())
         try:
@@ -188,12 +186,10 @@ def _inequalities(nlp: NLP, z: np.ndarray, g: np.ndarray, dg: csr_matrix) -> tup
 
 
 def _reduced(nlp: NLP, equations: csr_matrix, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Reduced gradients (d, k) of k functions with gradients (k, n), what is left of each after the best multipliers of the equations; and
-    these multipliers (equations, k).
+    """Reduced gradients (d, k) of k functions with gradients (k, n), and the multipliers (equations, k) that leave them.
 
-    Each is W s for the s that minimises s'Ws/2 - gradient's where equations s = 0; W is 1 for free variables and peaks, and next to nothing
-    for the others. Where the equations determine the others, these follow from the free ones, and it is the total derivative by these, less
-    what the equations beyond those can take from it. Raises RuntimeError where they do not.
+    Each is W s for the s that minimises s'Ws/2 - gradient's where equations s = 0; W is 1 for free variables and peaks, next to nothing for
+    others: the total derivative where these follow from the free ones. Raises RuntimeError where the equations do not determine them.
     """
     measured = np.isinf(nlp.span)
     measured[nlp.free] = True
@@ -290,9 +286,7 @@ def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) ->
 
 
 def ratio_bounds(conditions: Conditions, i: int, j: int, residual: float) -> tuple[float, float]:
-    """The least and the largest ratio of the weights of objectives j and i, in scales, with which no more than `residual` is left of the
-    conditions; not numbers where neither has a weight. All that lies between does as well. Each takes up to 24 solves of least squares.
-    """
+    """Least and largest ratio of the weights of objectives j and i, in scales, that leave at most `residual`; nan without weights."""
     if conditions.scaled is None or conditions.scaled[0][[i, j]].max() <= 0.0:
         return np.nan, np.nan
     one, other = conditions.scaled[0][[i, j]]

@@ -204,17 +204,22 @@ def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> W
     check_stopping()
     of_rows, of_objectives = multiplied(dg, rows, scales), multiplied(dF, inverse, scales)
     jacobian = ca.blockcat([[of_rows, ca.MX(r, 1)], [of_objectives, -slope], [of_objectives, ca.MX(m, 1)]])
-    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", r + 2 * m)
+    lam_g = ca.MX.sym("lam_g", r + 2 * m)
     of_g, moving, resting = ca.vertsplit(lam_g, [0, r, r + m, r + 2 * m])
     # The program's own objective is linear.
     curvature = multiplied(hessian(nlp)(z, (moving + resting) * inverse, of_g * rows), scales, scales)
-    curvature = ca.diagcat(curvature, ca.MX(1, 1))
-    derivatives = {
-        "jac_g": ca.Function("jac_g", [x, p], [values, jacobian], ["x", "p"], ["g", "jac_g_x"]),
-        "hess_lag": ca.Function("hess_lag", [x, p, lam_f, lam_g], [curvature], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]),
-    }
+    derivatives = derivatives_of_program(x, p, (values, jacobian), lam_g, ca.diagcat(curvature, ca.MX(1, 1)))
     settings = ipopt_options(seconds, max_iterations) | {f"ipopt.{name}": value for name, value in options}
     return Watched("scalarized", {"x": x, "p": p, "f": x[n], "g": values}, settings | derivatives)
+
+
+def derivatives_of_program(x: ca.MX, p: ca.MX, rows: tuple[ca.MX, ca.MX], lam_g: ca.MX, curvature: ca.MX) -> dict[str, ca.Function]:
+    """The options of `nlpsol` that give it the rows with their Jacobian, and the upper triangle of the Hessian of a linear objective."""
+    names = ["x", "p", "lam_f", "lam_g"]
+    return {
+        "jac_g": ca.Function("jac_g", [x, p], list(rows), names[:2], ["g", "jac_g_x"]),
+        "hess_lag": ca.Function("hess_lag", [x, p, ca.MX.sym("lam_f"), lam_g], [curvature], names, ["triu_hess_gamma_x_x"]),
+    }
 
 
 def multiplied(matrix: ca.MX, rows: ca.MX, columns: ca.MX) -> ca.MX:

@@ -24,6 +24,14 @@ COMPILER_SECONDS = 30.0
 log = logging.getLogger(__name__)
 _useless: set[str] = set()
 """Commands that hung, or cannot be run, in this process."""
+LONGEST_COMPILED = 20_000
+"""Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
+BLOCK = 64
+"""Most calls at once: each number of them needs a Function of its own."""
+WORTH_A_BLOCK = 24
+"""Calls of a block of so many from which on all of them, by a wide Function, take less time."""
+CHAIN = "chain"
+"""Name of a Function of so many repetitions that it, and all that it is a part of, is not to be written out."""
 
 
 def compiler() -> str | None:
@@ -100,17 +108,6 @@ def _give_up(command: str, reason: str) -> None:
     """Note that Functions stay interpreted from now on: a compiler that failed once would fail again."""
     _useless.add(command)
     log.warning("functions are not compiled, and take more time: %s: %s", command, reason)
-
-
-LONGEST_COMPILED = 20_000
-"""Most instructions of a Function that is compiled: a compiler's time grows faster than they do."""
-BLOCK = 64
-"""Most calls at once: each number of them needs a Function of its own."""
-WORTH_A_BLOCK = 24
-"""Calls of a block of so many from which on all of them, by a wide Function, take less time."""
-
-
-log = logging.getLogger(__name__)
 
 
 class Batched:
@@ -229,10 +226,6 @@ def widened(function: ca.Function, k: int) -> ca.Function:
         else:
             memory[out[0]] = ca.MX.binary(operation, memory[of[0]], memory[of[1]])
     return ca.Function(function.name(), symbols, [ca.densify(ca.horzcat(ca.MX(k, 0), *columns)) for columns in found])
-
-
-CHAIN = "chain"
-"""Name of a Function of so many repetitions that it, and all that it is a part of, is not to be written out."""
 
 
 def expanded(function: ca.Function) -> ca.Function:

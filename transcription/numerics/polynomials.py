@@ -7,13 +7,12 @@ centennial retrospective", CAGD 29(6), 2012).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.special import comb, roots_jacobi
-
-BASES = ("lobatto", "legendre", "closed-legendre", "radau", "closed-radau", "chebyshev", "bernstein")
 
 
 def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -43,6 +42,19 @@ def chebyshev_nodes(n: int) -> np.ndarray:
     return np.sin(np.pi * (2.0 * np.arange(n) - (n - 1)) / (2.0 * (n - 1)))
 
 
+NODES: dict[str, Callable[[int], np.ndarray]] = {
+    "lobatto": lambda degree: lobatto_nodes(degree + 1),
+    "legendre": lambda degree: gauss_legendre(degree + 1)[0],
+    "closed-legendre": lambda degree: np.array([-1.0, *gauss_legendre(degree - 1)[0], 1.0]),
+    "radau": lambda degree: radau_nodes(degree + 1),
+    "closed-radau": lambda degree: np.append(radau_nodes(degree), 1.0),
+    "chebyshev": lambda degree: chebyshev_nodes(degree + 1),
+    "bernstein": lambda degree: np.linspace(-1.0, 1.0, degree + 1) if degree else np.zeros(1),
+}
+"""The places of the coefficients of each basis, by degree."""
+BASES = tuple(NODES)
+
+
 @cache
 def nodes(basis: str, degree: int) -> np.ndarray:
     """The places of a basis' coefficients on [-1, 1], shape (degree + 1,).
@@ -50,22 +62,9 @@ def nodes(basis: str, degree: int) -> np.ndarray:
     Those of a Lagrange basis are its nodes ("closed-legendre": Gauss-Legendre nodes and both ends; "closed-radau": Gauss-Radau nodes and
     1), those of Bernstein's the equally spaced abscissae of the control points. Raises ValueError for an unknown basis.
     """
-    if basis == "lobatto":
-        points = lobatto_nodes(degree + 1)
-    elif basis == "legendre":
-        points = gauss_legendre(degree + 1)[0]
-    elif basis == "closed-legendre":
-        points = np.array([-1.0, *gauss_legendre(degree - 1)[0], 1.0])
-    elif basis == "radau":
-        points = radau_nodes(degree + 1)
-    elif basis == "closed-radau":
-        points = np.append(radau_nodes(degree), 1.0)
-    elif basis == "chebyshev":
-        points = chebyshev_nodes(degree + 1)
-    elif basis == "bernstein":
-        points = np.linspace(-1.0, 1.0, degree + 1) if degree else np.zeros(1)
-    else:
+    if basis not in NODES:
         raise ValueError(f"unknown basis '{basis}'; there are {', '.join(BASES)}")
+    points = NODES[basis](degree)
     points.setflags(write=False)
     return points
 

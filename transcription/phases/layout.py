@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
@@ -18,10 +16,9 @@ HIDDEN = 2**40
 class Layout:
     """Collects the variables of an NLP and hands out their slots.
 
-    A slot is the index of a variable, or a negative number for a constant: a quantity whose bounds coincide is no variable. Two quantities
-    that are always equal (a linked boundary state) share one slot. Beside these there are *hidden* quantities, which are no variables
-    either, but follow from them at some expense: states in between, integrals. Slots are those of the *extended* vector: the variables,
-    the hidden quantities, then the constants; see `index`.
+    A slot is the index of a variable, or a negative number for a constant, of coinciding bounds. Quantities always equal share one.
+    *Hidden* quantities are no variables, but follow from them at some expense: states in between, integrals. Slots are those of the
+    *extended* vector: variables, hidden quantities, constants; see `index`.
     """
 
     def __init__(self) -> None:
@@ -42,11 +39,9 @@ class Layout:
 
     def add_table(self, prefix: str, variables: Sequence[Variable], rows: int, columns: int, *, free: bool = False) -> np.ndarray:
         """The same quantities at rows x columns places (elements x coefficients); returns slots (rows, columns, len(variables))."""
-        with _uncollected():
-            slots = [
-                [[self.add(v.named(f"{prefix}{v.name}[{j},{k}]"), free=free) for v in variables] for k in range(columns)]
-                for j in range(rows)
-            ]
+        slots = [
+            [[self.add(v.named(f"{prefix}{v.name}[{j},{k}]"), free=free) for v in variables] for k in range(columns)] for j in range(rows)
+        ]
         return np.array(slots, dtype=int).reshape(rows, columns, len(variables))
 
     def add_hidden(self, *shape: int) -> np.ndarray:
@@ -99,15 +94,3 @@ class Layout:
         """Set the variables among `slots` of extended vectors (k, ...) to `values` (k, *slots.shape, ...); constants stay what they are."""
         flat, mask = slots.ravel(), slots.ravel() >= 0
         extended[:, flat[mask]] = values.reshape(len(extended), slots.size, *extended.shape[2:])[:, mask]
-
-
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Pauses the garbage collector, which would scan a long table of variables many times while it is made."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()

@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.checks import check_count
 
-SHORTEST = 1e-9
+SHORTEST_ELEMENT = 1e-9
 """Shortest element, relative to its phase: below, its length is mostly rounding."""
 
 
@@ -32,8 +32,8 @@ class PhaseMesh:
             edges = np.array(self.edges, dtype=float)
         except (TypeError, ValueError):
             edges = np.empty((0, 0))
-        if edges.ndim != 1 or len(edges) < 2 or (edges[0], edges[-1]) != (0.0, 1.0) or not (np.diff(edges) >= SHORTEST).all():
-            raise ValueError(f"edges of a mesh must increase from 0 to 1, by at least {SHORTEST:g} each, not {self.edges!r}")
+        if edges.ndim != 1 or len(edges) < 2 or (edges[0], edges[-1]) != (0.0, 1.0) or not (np.diff(edges) >= SHORTEST_ELEMENT).all():
+            raise ValueError(f"edges of a mesh must increase from 0 to 1, by at least {SHORTEST_ELEMENT:g} each, not {self.edges!r}")
         check_count("order of a mesh", self.order, 0)
         object.__setattr__(self, "edges", tuple(edges.tolist()))
         object.__setattr__(self, "order", int(self.order))
@@ -119,8 +119,8 @@ class PhaseMesh:
 
     def with_elements(self, edges: Sequence[float], order: int, control_order: int | None) -> PhaseMesh:
         """Other elements, and degrees on them, with the same moving edges and arcs. Raises ValueError if these are not among `edges`."""
-        j = np.searchsorted(edges, [self.edges[k] - SHORTEST for k in self.moving])
-        if any(k >= len(edges) or abs(edges[k] - self.edges[one]) > SHORTEST for k, one in zip(j, self.moving, strict=True)):
+        j = np.searchsorted(edges, [self.edges[k] - SHORTEST_ELEMENT for k in self.moving])
+        if any(k >= len(edges) or abs(edges[k] - self.edges[one]) > SHORTEST_ELEMENT for k, one in zip(j, self.moving, strict=True)):
             raise ValueError("a moving edge of a mesh has to stay one of its edges")
         return PhaseMesh(tuple(edges), order, control_order, tuple(j.tolist()), self.constant)
 

@@ -48,6 +48,11 @@ class Parts:
     affine: ca.Function  # z, each w (size of w, k) -> (L, q), columns
     scores: ca.Function  # q -> (F, the rows of g after L)
 
+    @classmethod
+    def of(cls, z: ca.MX, points: Sequence[Pointwise], rows: ca.MX, quantities: ca.MX, scores: ca.Function) -> Parts:
+        affine = ca.Function("affine", [z, *(one.values for one in points)], [ca.densify(rows), ca.densify(quantities)])
+        return cls(tuple(one.function for one in points), ca.Function("inputs", [z], [one.inputs for one in points]), affine, scores)
+
 
 @dataclass(frozen=True, eq=False)
 class EndSlots:

@@ -87,8 +87,7 @@ class ControlLaw:
 def _spline_weights(nodes: np.ndarray, piece: np.ndarray, place: np.ndarray) -> csc_matrix:
     """Sparse matrix (nodes, k) of the values of a spline by those at its nodes, in these pieces and at these places in them, (k,).
 
-    Some pieces at a time, by the spline through the nodes near them. Weights fall by a factor of 3.7 a node: over 48 nodes, also of pieces
-    that grow by a tenth each, below 1e-20. What is less than 1e-17 counts as 0.
+    Some pieces at a time, by the nodes near them: weights fall by 3.7 a node, over 48 of them below 1e-20; less than 1e-17 counts as 0.
     """
     from scipy.interpolate import CubicSpline  # slow to import
 

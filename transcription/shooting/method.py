@@ -20,33 +20,15 @@ from problems.problem import Problem
 from ..assembly import Assembly
 from ..base import NLP, Transcription
 from ..meshed import Meshed
-from ..meshes.refinement import DENSITY_FLOORS, equidistributed, integrals, raised, trajectory_density
+from ..meshes.refinement import DENSITY_FLOORS, next_intervals
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
 from ..phases.rows import EndSlots
-from ..trajectories.trajectory import PhaseTrajectory, Trajectory
+from ..trajectories.trajectory import Trajectory
 from .control_law import DEGREES, ControlLaw
 from .phase import ShootingPhase
 from .runge_kutta import TABLEAUX, check_steps
 from .step import RungeKuttaStep, StepMesh
-
-
-def next_intervals(
-    old: PhaseMesh, phase: PhaseTrajectory, errors: np.ndarray, of_controls: np.ndarray, degree: int, least: float, most: int
-) -> PhaseMesh:
-    """The next mesh of a phase, by its density: more intervals where errors (N,) ask for it, or where nothing is wrong."""
-    places, values = trajectory_density(phase)
-    right = max(errors.max(initial=0.0), of_controls.max(initial=0.0)) <= 1.0
-    count = min(max(most, old.elements), int(np.ceil(1.5 * old.elements))) if right else old.elements
-    curved = count * raised(places, values, least)
-    # Errors of a step fall with the order and one more, those of controls of this degree twice as fast as their last coefficient.
-    shorter = np.maximum(errors ** (1.0 / (old.order + 1)), of_controls ** (0.5 / max(degree, 1)))
-    # A step that is too long becomes somewhat shorter than that, but no more than four times: its error says little about finer meshes.
-    shorter = np.minimum(np.nan_to_num(np.where(shorter > 1.0, 1.25 * shorter, shorter), nan=4.0), 4.0)
-    needed = shorter / np.diff(places)
-    density = np.maximum(curved, (needed * old.elements / (len(places) - 1))[:, None])
-    count = max(count, min(most, int(np.ceil(integrals(places, density)[-1] - 1e-9))))
-    return PhaseMesh(tuple(equidistributed(places, density, count).tolist()), old.order)
 
 
 @dataclass(frozen=True, kw_only=True)

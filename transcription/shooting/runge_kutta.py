@@ -19,6 +19,10 @@ from problems.compiled import CompiledPhase, CompiledProblem
 
 from ..phases.writer import state_along
 
+UNSTABLE_GROWTH = log(1e3)
+"""A mode that decays by this much really, and grows by this much in computation, is unstable."""
+PLACES_OF_MODES = np.linspace(0.0, 1.0, 5)
+
 
 @dataclass(frozen=True)
 class Tableau:
@@ -108,11 +112,6 @@ TABLEAUX: dict[str, Tableau] = {
 """All there are: Euler, explicit midpoint, Heun (trapezoidal), Kutta's third order, the classical one, the 3/8 rule, Cooper and Verner."""
 
 
-FACTOR = log(1e3)
-"""A mode that decays by this much really, and grows by this much in computation, is unstable."""
-POINTS = np.linspace(0.0, 1.0, 5)
-
-
 def check_steps(
     problem: CompiledProblem,
     scheme: Tableau,
@@ -121,7 +120,13 @@ def check_steps(
     settings: Mapping[str, int],
     own: Collection[str] = (),
 ) -> None:
-    """Raise a ValueError that names the phase, the step, the scheme and what to change, where steps cannot be stable. places (N + 1,)."""
+    """Raise a ValueError that names the phase, the step, the scheme and what to change, where steps cannot be stable. places (N + 1,).
+
+    An explicit method multiplies a decaying mode of rate lambda by R(h lambda) with each step: where that is more than 1, what should
+    vanish grows. Before any work only the dynamics within the bounds are known, so that only what is certain is refused: a mode that
+    decays during the shortest phase there may be, and grows by a lot in these steps, at each of several points, from the initial to the
+    final or guessed states, under low, middle and high controls.
+    """
     p = np.array([problem.guesses.get(v.name, 0.5 * (v.lower + v.upper)) for v in problem.parameters])
     for phase in problem.phases:
         shares = np.diff(places[phase.name])
@@ -154,7 +159,7 @@ def _growing(scheme: Tableau, decay: np.ndarray, shares: np.ndarray) -> np.ndarr
     lengths, place = np.unique(shares, return_inverse=True)
     growth = np.log(np.maximum(np.abs(scheme.stability(np.multiply.outer(lengths, decay))), 1e-300))[place]
     sums = np.cumsum(np.vstack([np.zeros(len(decay)), growth]), axis=0)
-    return (decay.real < -FACTOR) & ((sums - np.minimum.accumulate(sums, axis=0)).max(axis=0) > FACTOR)
+    return (decay.real < -UNSTABLE_GROWTH) & ((sums - np.minimum.accumulate(sums, axis=0)).max(axis=0) > UNSTABLE_GROWTH)
 
 
 def _modes(phase: CompiledPhase, length: float, p: np.ndarray, *, middle: bool) -> list[tuple[np.ndarray, list[str]]]:
@@ -168,13 +173,13 @@ def _modes(phase: CompiledPhase, length: float, p: np.ndarray, *, middle: bool) 
     start, s = np.array([t0]), np.array([t0, t0 + length, *p])
     span, found = np.array([v.span for v in phase.states]), []
     first = [np.array([0.5 * sum(limits)]) for limits in phase.initial]
-    states = np.array([state_along(phase, i, value, start, start + length, POINTS)[0] for i, value in enumerate(first)]).T
+    states = np.array([state_along(phase, i, value, start, start + length, PLACES_OF_MODES)[0] for i, value in enumerate(first)]).T
     bounds = [[0.5 * (v.lower + v.upper) for v in phase.states]]
     for x in np.vstack([states, bounds]) if middle else states:
         for level in (0.0, 0.5, 1.0):
             u = [v.lower + level * v.span for v in phase.controls]
             matrix = np.array(jacobian(x, u, t0 + 0.5 * length, s))
-            if not np.isfinite(matrix).all() or _fastest(matrix) * length < FACTOR:
+            if not np.isfinite(matrix).all() or _fastest(matrix) * length < UNSTABLE_GROWTH:
                 return []
             rates, vectors = np.linalg.eig(matrix)
             found.append((rates, [phase.states[i].name for i in np.argmax(np.abs(vectors) / span[:, None], axis=0)]))

@@ -41,11 +41,10 @@ def paths_and_peaks(
 def largest_on_elements(
     phase: CompiledPhase, state: PiecewisePolynomial, trajectory: PhaseTrajectory, s: np.ndarray, paths: np.ndarray, peaks: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The largest scaled excess of each path constraint (N, c), 0 where there is none, and the largest value of each peak (N, p).
+    """The largest scaled excess of each path constraint (N, c), at least 0, and the largest value of each peak (N, p).
 
-    What is narrower than the gaps between samples, such as a small obstacle on a long way, is found by its flanks: where the slopes of the
-    samples about the largest one let something exceed a limit, or the peak of the whole phase, the gaps beside it are sampled closer. s
-    (ns,), paths, peaks (N, len(DENSE).
+    What is narrower than the gaps between samples is found by its flanks: where the slopes beside the largest sample let something exceed a
+    limit, or the phase's peak, the gaps are sampled closer. s (ns,), paths, peaks (N, len(DENSE), ...).
     """
     count = len(phase.paths)
     values = np.concatenate([_beyond(paths, phase.paths), peaks], axis=2)
@@ -101,12 +100,11 @@ def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, fl
 
 def excess_by_element(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> dict[str, np.ndarray]:
     """Excursions (N,) of each state, control that is not periodic, and path constraint on each element, in scales."""
-    times = trajectory.state.times(DENSE)
-    states, controls = trajectory.state.on_elements(DENSE), trajectory.controls_on_elements(DENSE)
-    x, u = (values.reshape(times.size, values.shape[2]) for values in (states, controls))
-    s = np.array([trajectory.t0, trajectory.tf, *parameters])
-    paths = paths_and_peaks(phase, x, u, times.ravel(), s)[0].reshape(*times.shape, len(phase.paths))
-    beyond = largest_on_elements(phase, trajectory.state, trajectory, s, paths, np.empty((*times.shape, 0)))[0]
+    x, u, times, s = trajectory.sampled(DENSE, parameters)
+    shape = len(trajectory.state.edges) - 1, len(DENSE)
+    paths = paths_and_peaks(phase, x, u, times, s)[0].reshape(*shape, len(phase.paths))
+    beyond = largest_on_elements(phase, trajectory.state, trajectory, s, paths, np.empty((*shape, 0)))[0]
+    states, controls = (values.reshape(*shape, values.shape[1]) for values in (x, u))
     amounts = np.hstack([excess(states, phase.states), excess(controls, phase.controls), beyond])
     limits: tuple[Variable | Limit, ...] = (*phase.states, *phase.controls, *phase.paths)
     return {limit.name: amounts[:, i] for i, limit in enumerate(limits) if getattr(limit, "period", None) is None}

@@ -2,35 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
 
 import numpy as np
 
 from problems.compiled import Limit, Variable
 
 from ..numerics.polynomials import basis_matrix
-
-
-def wrapped(controls: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
-    """Controls (..., nu) of which the periodic ones are brought back into their bounds."""
-    result = np.array(controls, dtype=float)
-    for i, v in enumerate(variables):
-        if v.period:
-            result[..., i] = v.lower + np.mod(result[..., i] - v.lower, v.period)
-    return result
-
-
-def unwrapped(coefficients: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
-    """Coefficients (N, degree + 1, nu), periodic ones the short way round in an element; half a period goes down."""
-    result = np.array(coefficients, dtype=float)
-    for i, v in enumerate(variables):
-        for k in range(1, result.shape[1] if v.period else 0):
-            step = result[:, k, i] - result[:, k - 1, i]
-            result[:, k, i] -= v.period * np.floor(step / v.period + 0.5)
-    return result
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,6 +122,19 @@ class PhaseTrajectory:
         size = f"{len(self.time)} nodes on {len(self.state.edges) - 1} elements"
         return f"PhaseTrajectory('{self.name}', {self.t0:g} to {self.tf:g} {self.time_unit}, {size}, [{', '.join(self.names)}])"
 
+    def _repr_html_(self) -> str:
+        """For notebooks: a title, and a row for each quantity with a small line over time. Names are escaped."""
+        limits: tuple[Variable | Limit, ...] = (*self.state_variables, *self.control_variables, *self.path_limits)
+        kinds = [*(["state"] * self.states.shape[1]), *(["control"] * self.controls.shape[1]), *(["path"] * self.paths.shape[1])]
+        rows = [_cells(("", "kind", "unit", "first", "last", "least", "most", "over time"), "th")]
+        columns = np.hstack([self.states, self.controls, self.paths]).T
+        for name, kind, unit, values in zip(self.names, kinds, (limit.unit for limit in limits), columns, strict=True):
+            numbers = [f"{value + 0.0:.6g}" for value in (values[0], values[-1], values.min(), values.max())]
+            rows.append(f"{_cells((name, kind, unit, *numbers), 'td')}<td>{_line(self.time, values)}</td>")
+        table = "".join(f"<tr>{row}</tr>" for row in rows)
+        title = f"{escape(self.name)}: {self.t0:.6g} to {self.tf:.6g} {escape(self.time_unit)}, {len(self.time)} nodes"
+        return f"<div><b>{title}</b></div><table>{table}</table>"
+
     @property
     def t0(self) -> float:
         return float(self.state.edges[0])
@@ -175,6 +168,12 @@ class PhaseTrajectory:
     def controls_on_elements(self, tau: np.ndarray) -> np.ndarray:
         """The same on every element, shape (N, len(tau), nu)."""
         return wrapped(self.control.on_elements(tau), self.control_variables)
+
+    def sampled(self, tau: np.ndarray, parameters: Sequence[float] | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """States (k, nx), controls (k, nu), times (k,) at `tau` of all elements, one after the other; s = [t0, tf, *parameters]."""
+        times, x, u = self.state.times(tau), self.state.on_elements(tau), self.controls_on_elements(tau)
+        s = np.array([self.t0, self.tf, *parameters])
+        return x.reshape(times.size, x.shape[2]), u.reshape(times.size, u.shape[2]), times.ravel(), s
 
     def at(self, time: float | np.ndarray) -> dict[str, float | np.ndarray]:
         """States and controls by name at a time, or at an array of times, interpolated by the method's own polynomials.
@@ -227,8 +226,9 @@ class Trajectory(Mapping[str, PhaseTrajectory]):
 
     def _repr_html_(self) -> str:
         """For notebooks: a table for each phase, with a small line of each quantity over time."""
-
-        return trajectory_html(self)
+        values = ", ".join(f"{escape(name)} {value:.6g}" for name, value in self.parameters.items())
+        parts = [*(phase._repr_html_() for phase in self.phases), *([f"<div>parameters: {values}</div>"] if values else [])]
+        return f"<div>{''.join(parts)}</div>"
 
     def __getitem__(self, name: str) -> PhaseTrajectory:
         for phase in self.phases:
@@ -243,28 +243,23 @@ class Trajectory(Mapping[str, PhaseTrajectory]):
         return len(self.phases)
 
 
-def trajectory_html(trajectory: Any) -> str:
-    """HTML of a `Trajectory`: a table for each phase, with a row and a small line over time for each quantity. Names are escaped."""
-    parts = [_phase(phase) for phase in trajectory.phases]
-    if trajectory.parameters:
-        values = ", ".join(f"{escape(name)} {value:.6g}" for name, value in trajectory.parameters.items())
-        parts.append(f"<div>parameters: {values}</div>")
-    return f"<div>{''.join(parts)}</div>"
+def wrapped(controls: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
+    """Controls (..., nu) of which the periodic ones are brought back into their bounds."""
+    result = np.array(controls, dtype=float)
+    for i, v in enumerate(variables):
+        if v.period:
+            result[..., i] = v.lower + np.mod(result[..., i] - v.lower, v.period)
+    return result
 
 
-def _phase(phase: Any) -> str:
-    """A title and a table of one `PhaseTrajectory`, at its nodes."""
-    units = [v.unit for v in (*phase.state_variables, *phase.control_variables, *phase.path_limits)]
-    kinds = [*(["state"] * phase.states.shape[1]), *(["control"] * phase.controls.shape[1]), *(["path"] * phase.paths.shape[1])]
-    heads = ("", "kind", "unit", "first", "last", "least", "most", "over time")
-    rows = [_cells(heads, "th")]
-    for name, kind, unit, values in zip(phase.names, kinds, units, np.hstack([phase.states, phase.controls, phase.paths]).T, strict=True):
-        numbers = [f"{value + 0.0:.6g}" for value in (values[0], values[-1], values.min(), values.max())]
-        cells = _cells((name, kind, unit, *numbers), "td")
-        rows.append(f"{cells}<td>{_line(phase.time, values)}</td>")
-    table = "".join(f"<tr>{row}</tr>" for row in rows)
-    title = f"{escape(phase.name)}: {phase.t0:.6g} to {phase.tf:.6g} {escape(phase.time_unit)}, {len(phase.time)} nodes"
-    return f"<div><b>{title}</b></div><table>{table}</table>"
+def unwrapped(coefficients: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
+    """Coefficients (N, degree + 1, nu), periodic ones the short way round in an element; half a period goes down."""
+    result = np.array(coefficients, dtype=float)
+    for i, v in enumerate(variables):
+        for k in range(1, result.shape[1] if v.period else 0):
+            step = result[:, k, i] - result[:, k - 1, i]
+            result[:, k, i] -= v.period * np.floor(step / v.period + 0.5)
+    return result
 
 
 def _cells(cells: tuple[str, ...], tag: str) -> str:
