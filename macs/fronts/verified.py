@@ -64,6 +64,7 @@ class Independent(NamedTuple):
     violation: np.ndarray  # (n,)
     worst: list[str]  # the constraint that each point violates most
     violations: Sequence[Mapping[str, float] | None]  # of all constraints
+    diverged: dict[int, str]  # where the simulation of a point has no finite states any more
 
     def off(self, points: Points, scales: np.ndarray) -> np.ndarray:
         """Differences (n, m) of objectives, in `scales` (m,)."""
@@ -74,12 +75,25 @@ class Independent(NamedTuple):
 def simulated_independently(points: Points, simulate: Callable[[list[Trajectory]], Sequence[Simulation]]) -> Independent:
     """The points as `simulate` gives them."""
     problem, (n, m) = points.compiled(), points.F.shape
-    found = Independent(np.full((n, m), np.nan), np.full(n, np.nan), np.full(n, np.nan), [""] * n, points.violations)
+    found = Independent(np.full((n, m), np.nan), np.full(n, np.nan), np.full(n, np.nan), [""] * n, points.violations, {})
     flown = {i: trajectory for i, trajectory in enumerate(points.trajectories) if trajectory is not None}
     for i, simulation in zip(flown, simulate([*flown.values()]), strict=True):
         found.worst[i], found.violation[i] = worst_violation(problem, simulation)
         found.defect[i], found.F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
+        if not np.isfinite(simulation.max_defect):
+            found.diverged[i] = _divergence(simulation)
     return found
+
+
+def _divergence(simulation: Simulation) -> str:
+    """Text with the element on which the states of a simulation are no longer finite."""
+    for phase in simulation.trajectory.phases:
+        finite = np.isfinite(phase.states).all(axis=1)
+        if not finite.all():
+            edges, time = phase.state.edges, phase.time[int(np.argmin(finite))]
+            j = int(np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2))
+            return f"it diverges in phase '{phase.name}' between t = {edges[j]:.4g} and {edges[j + 1]:.4g} {phase.time_unit}".rstrip()
+    return "its objectives are not finite"
 
 
 def evaluated_independently(points: Points) -> Independent:
@@ -87,7 +101,9 @@ def evaluated_independently(points: Points) -> Independent:
     problem = points.stated()
     assert isinstance(problem, CompiledVectorProblem)
     F, violation, violations = evaluated_again(problem, points.decision)
-    return Independent(F, np.zeros(len(F)), violation, [max(one, key=lambda name: one[name], default="") for one in violations], violations)
+    return Independent(
+        F, np.zeros(len(F)), violation, [max(one, key=lambda name: one[name], default="") for one in violations], violations, {}
+    )
 
 
 def verified(
@@ -142,7 +158,7 @@ def _allowed(points: Points, tolerance: float) -> float:
 def _misses(points: Points, i: int, found: Independent, off: np.ndarray, tolerance: float, allowed: float, remark: bool) -> list[str]:
     """In words, what point i misses by more than the tolerance."""
     if points.dynamic and not np.isfinite(found.defect[i]):
-        return ["its states grow beyond all numbers, or their rates are no numbers somewhere along it"]
+        return [found.diverged[i]]
     if not points.dynamic and not np.isfinite(found.F[i]).all():
         return ["it fails"]
     reasons = []

@@ -142,6 +142,17 @@ def test_an_error_that_grows_by_itself_is_called_unstable():
     assert "its states differ by" in coarse.note and "unstable" not in coarse.note
 
 
+def test_a_simulation_that_diverges_says_where():
+    """x' = x^4 from 1 is infinite after a third of a second, in the second of nine elements."""
+    problem = Problem("blow-up")
+    phase = problem.phase("run", t0=0.0, tf=2.7)
+    x = phase.state("x", bounds=(-5, 5), initial=1.0)
+    phase.dynamics(x=x**4 + phase.control("u", bounds=(-1, 1)))
+    problem.maximize("end", phase.final(x))
+    (point,) = points(problem, [0.0] * 9, method=DFET(9, 0)).verify(1.0)
+    assert not point.verified and point.note == "simulated, it diverges in phase 'run' between t = 0.3 and 0.6 s"
+
+
 def test_an_error_of_one_element_in_the_middle_is_not_called_unstable():
     """A wind that changes too fast for the first element, while the second, without thrust, is exact."""
     problem = Problem("gust")
