@@ -37,7 +37,7 @@ class WorkersLost(RuntimeError):  # noqa: N818 - an event outside the program, n
     """The executor was shut down or lost all its workers. Finished runs are kept; the same call again makes the rest."""
 
 
-class Going(msgspec.Struct):
+class RunProgress(msgspec.Struct):
     """A run that is being made: its cell's folder, its number, its evaluations and seconds so far."""
 
     folder: str
@@ -60,7 +60,7 @@ class ProgressRecord(msgspec.Struct):
     began: float  # when this call of the study began, in seconds since 1970
     elapsed: float  # seconds since then
     left: float | None  # seconds that the rest takes, if it goes on like this; None if that is not known yet
-    going: list[Going]  # the runs that are being made; runs on the workers of an executor are not known
+    going: list[RunProgress]  # the runs that are being made; runs on the workers of an executor are not known
     goals: dict[str, list[ObjectiveRecord]] = {}  # objectives by label of the problem: no front has to be read to know them
 
 
@@ -132,9 +132,9 @@ class StudyDisplay(Display):
             self._failed += 1
             self.say(f"{self._title}: run {run.number} of {run.cell.name} {reason(outcome.status, outcome.message)}")
 
-    def going(self) -> tuple[list[Going], float | None]:
+    def going(self) -> tuple[list[RunProgress], float | None]:
         """The runs that are being made, and the seconds that the rest takes if it goes on like this; None if that is not known yet."""
-        now = [Going(run.cell.folder, run.number, evaluations, elapsed) for run, evaluations, elapsed in list(self._going.values())]
+        now = [RunProgress(run.cell.folder, run.number, evaluations, elapsed) for run, evaluations, elapsed in list(self._going.values())]
         done = self._done + sum(one.evaluations for one in now)
         return now, self.elapsed * (self._work - done) / done if 0 < done < self._work else None
 

@@ -11,7 +11,7 @@ from problems import Problem
 from runs import Study
 from runs.batch.store import Store
 from runs.report.comparison import comparisons
-from transcription import DFET, Smooth, parse
+from transcription import Smooth, parse
 
 APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform"}}
 SOLVERS = {"macs": Plain(agents=4), "nsga2": NSGA2(population=10)}
@@ -141,12 +141,6 @@ def test_a_study_that_says_nothing_does_as_the_command_line_does(tmp_path):
     assert plain.front.F.tolist() == Plain().solve(glide(most=6.0), parse("dfet:2x2"), **given).F.tolist() != front.F.tolist()
 
 
-def test_a_case_without_its_own_is_as_if_the_study_said_so():
-    assert bare(glide()).definition() == bare(glide(), inner="auto").definition()
-    assert "terms" not in bare(glide()).cells[0].details
-    assert bare(glide().compile(), transcriptions="dfet:2x2", evaluations=60).definition() == bare(glide()).definition()
-
-
 def test_what_a_study_or_a_solver_says_comes_before_what_the_case_says():
     def found(problem=None, **more) -> tuple:
         one = bare(problem or narrow(), **more)
@@ -197,17 +191,3 @@ def test_a_reference_is_held_against_the_problems_before_any_run(tmp_path):
     ):
         with pytest.raises(ValueError, match=message):
             study(reference=given)
-
-
-@pytest.mark.slow
-def test_a_transcription_of_its_own_may_be_a_label_of_the_study(tmp_path):
-    words = {"coarse": "dfet:2x2", "fine": DFET(3, 2, control_order=0), "unused": "dfet:9x9"}
-    given = {"macs": {"transcription": "coarse"}, "nsga2": {"transcription": "fine"}}
-    ours = study(transcriptions=words, terms=given)
-    assert [cell.labels[1:] for cell in ours.cells] == [("coarse", "macs"), ("fine", "nsga2")]
-    assert ours.cells[1].details["transcription"] == words["fine"].to_dict() and all(cell.apart for cell in ours.cells)
-    ours.run(tmp_path / "out", executor=Inline())
-    [comparison] = comparisons(Store.open(tmp_path / "out"), {})
-    assert list(comparison.fronts) == ["macs", "nsga2"] and comparison.place("nsga2") == "fine"
-    with pytest.raises(ValueError, match="transcription 'finer'"):
-        study(transcriptions=words, terms={"macs": {"transcription": "finer"}})

@@ -141,17 +141,6 @@ def test_the_command_line_solves_shows_verifies_and_chooses(tmp_path, monkeypatc
     assert "'welded beam' is a vector problem" in capsys.readouterr().err
 
 
-def test_a_problem_of_a_file_is_evaluated_again_only_with_trust(mine, capsys):
-    assert main(["solve", mine, "--seed", "1", "--evaluations", "150", "--out", "own.nc"]) == 0
-    assert "150 evaluations" in capsys.readouterr().out
-    assert main(["verify", "own.nc"]) == 2
-    assert "not run unasked" in capsys.readouterr().err
-    assert main(["verify", "own.nc", "--trust"]) == 0 == main(["verify", "own.nc", "--problem", mine])
-    Path("mine.py").write_text(MINE.replace("x - far", "x + far"))
-    assert main(["verify", "own.nc", "--trust"]) == 2
-    assert "values of the function differ" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [

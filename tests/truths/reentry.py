@@ -58,10 +58,6 @@ DIVISIONS, BEYOND = 12, 1.3
 RTOL = 1e-8
 
 
-class Unsolved(RuntimeError):  # noqa: N818 - a result of the search, not a mistake in the program
-    """Gradients did not find an end of the front, which is needed to locate it."""
-
-
 class Truth:
     """The front of a case as it becomes known."""
 
@@ -114,10 +110,8 @@ class Truth:
     def ends(self, steps: Steps, ceiling: np.ndarray) -> np.ndarray:
         """The best of each objective within a ceiling, and then all others as good as may be: objectives (4, 4).
 
-        Raises `Unsolved` if there is nothing to begin with, or the best of an objective is not found.
+        Raises RuntimeError if the best of an objective is not found.
         """
-        if not self.found:
-            raise Unsolved("no solve converged, and no flight was taken over: there is nothing to begin with")
         rows = []
         for i in range(4):
             steps.begin(f"end {i + 1}")
@@ -126,10 +120,8 @@ class Truth:
             alone = np.where(np.arange(4) == i, 0.0, np.inf)
             first = self.solve(self.found[nearest].z, alone, np.eye(4)[i], ceiling)
             if first.status != CONVERGED:
-                within = f" within {ceiling.tolist()}, minimised," if np.isfinite(ceiling).any() else ""
-                raise Unsolved(
-                    f"the best '{self.case.goals[i].name}'{within} was not found: its solve from the nearest of the {len(self.found)} "
-                    f"flights known ended as '{first.status}', with a violation of {first.violation:.1e}"
+                raise RuntimeError(
+                    f"best '{self.case.goals[i].name}': {first.status}, violation {first.violation:.1e}; no table is written"
                 )
             limit = np.where(np.arange(4) == i, first.F[i] + 1e-6 * abs(first.F[i]), ceiling)
             others = np.where(np.arange(4) == i, np.inf, first.F)
@@ -263,10 +255,7 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=120)
     parser.add_argument("--out")
     given = parser.parse_args()
-    try:
-        rows = made(given.case, given.points)
-    except Unsolved as error:
-        raise SystemExit(f"{given.case}: {error}; no table was written") from error
+    rows = made(given.case, given.points)
     write_whole(
         given.out or Path(statement.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode()
     )
