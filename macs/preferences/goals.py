@@ -14,7 +14,7 @@ from problems.checks import check_choice, check_interval, number, positive
 from problems.compiled import Objective
 
 from .preference import Preference, needed
-from .ranges import Ranges, levels, named, named_weights, places, shown
+from .ranges import Ranges, check_among, levels, named, named_weights, places, shown
 from .stage import Operand, Stage, greatest
 
 
@@ -194,16 +194,12 @@ class GoalProgramming(Preference):
                 raise ValueError(f"goal programming has no tolerances: give '{name}' the target Around({target.value:g})")
         if self.weights is not None:
             weights = named_weights(self.weights)
-            for name in weights:
-                if name not in targets:
-                    raise ValueError(f"'{name}' has a weight but no target; there are targets of {', '.join(targets)}")
+            check_among(weights, targets, "weight", "target", "targets")
             object.__setattr__(self, "weights", weights)
         if self.priorities is not None:
             given = levels(self.priorities)
             named_in = [name for level in given for name in level]
-            for name in named_in:
-                if name not in targets:
-                    raise ValueError(f"'{name}' has a priority but no target; there are targets of {', '.join(targets)}")
+            check_among(named_in, targets, "priority", "target", "targets")
             for name in targets:
                 if name not in named_in:
                     raise ValueError(f"'{name}' has a target but no priority")
@@ -280,8 +276,7 @@ class FuzzyGoal(Preference):
             return
         widths = {}
         for name, width in named(self.tolerances, "tolerances").items():
-            if name not in targets:
-                raise ValueError(f"'{name}' has a tolerance but no target; there are targets of {', '.join(targets)}")
+            check_among([name], targets, "tolerance", "target", "targets")
             if isinstance(targets[name], Around):
                 raise ValueError(f"the tolerance of '{name}' belongs into its target: Around(value, tolerance)")
             widths[name] = positive(width, f"the tolerance of '{name}'")

@@ -14,7 +14,7 @@ from problems.compiled import Objective
 
 from .preference import Preference
 from .preference_functions import RANGE_NAMES, FuzzyFunction, ObjectiveClass, PreferenceFunction, preference_functions
-from .ranges import Ranges, named, places
+from .ranges import Ranges, check_among, named, places
 from .stage import Operand, Stage, log10
 
 
@@ -161,9 +161,7 @@ class FuzzyPhysicalProgramming(PhysicalProgramming):
         super().__post_init__()
         if isinstance(self.spread, Mapping):
             given = {name: positive(value, f"the spread of '{name}'") for name, value in named(self.spread, "spread").items()}
-            for name in given:
-                if name not in self.classes:
-                    raise ValueError(f"'{name}' has a spread but no class; there are classes of {', '.join(self.classes)}")
+            check_among(given, self.classes, "spread", "class", "classes")
             for name in self.classes:
                 if name not in given:
                     raise ValueError(f"'{name}' has a class but no spread")

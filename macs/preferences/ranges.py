@@ -58,6 +58,13 @@ def names_of(values: Any, what: str) -> tuple[str, ...]:
     return names
 
 
+def check_among(names: Iterable[str], known: Iterable[str], has: str, lacks: str, all_of: str) -> None:
+    """Raise ValueError for a name that has something but is not among those known."""
+    for name in names:
+        if name not in known:
+            raise ValueError(f"'{name}' has a {has} but no {lacks}; there are {all_of} of {', '.join(known)}")
+
+
 def places(names: Iterable[str], goals: Sequence[Objective]) -> dict[str, int]:
     """The place of each of these objectives among the goals."""
     known = [goal.name for goal in goals]

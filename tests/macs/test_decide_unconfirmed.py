@@ -27,11 +27,10 @@ from macs.decisions import (
     Smaller,
     decide,
 )
-from macs.decisions.stages import ONLY_NEAR
 from macs.fronts.points import Points
 from macs.gradients.front_polish import KEPT_INSIDE
 from macs.preferences.stage import exceeded
-from problems import Problem, load
+from problems import Problem
 from transcription import DFET
 
 COARSE = DFET(2, 1, basis="bernstein")
@@ -92,8 +91,6 @@ WISHES: list[tuple[Preference, float]] = [
     # What the mesh of the first solve attains of the first goal is not what there is to be kept.
     (GoalProgramming({"end": end(6.0), "time": 3.2}, priorities=["end", "time"]), 6.0),
     (GoalProgramming({"end": 1.5, "time": 3.2}, priorities=["end", "time"]), time(1.5)),
-    # On the mesh of the first solve no point is within the limits.
-    (Nimbus({"end": end(4.5), "time": 4.5}, improve=["end"], until={"time": 4.6}), 4.6),
     (EVEN, 0.0),
 ]
 
@@ -119,6 +116,13 @@ def test_a_point_that_is_solved_again_answers_the_preference(preference: Prefere
     assert choice["steps"][-1]["objectives"] == pytest.approx(point.objectives)
 
 
+@pytest.mark.slow
+def test_limits_that_no_point_of_the_first_mesh_meets_are_met_on_another() -> None:
+    wanted = Nimbus({"end": end(4.5), "time": 4.5}, improve=["end"], until={"time": 4.6})
+    choice = decide(swing(), wanted, ranges=BOTH, start=rough())
+    assert choice.point.verified and choice.message == "" and choice.objectives["time"] == pytest.approx(4.6, abs=2e-3 * 2.8)
+
+
 def test_on_a_mesh_that_is_given_it_would_miss_by_far_and_cost_less() -> None:
     (fixed, choice), (mended, _) = (solved(WISHES[0][0], mesh) for mesh in ("fixed", "mended"))
     point = fixed[0]
@@ -141,27 +145,14 @@ def test_points_that_exceed_a_limit_between_nodes_are_moved_inside() -> None:
     start = payoff(bryson_denham(), DFET(6, 3), verify=1e-5, starts=1)
     terms = {"ranges": None, "start": start, "method": DFET(6, 3), "verify": 1e-5}
     wanted = ReferencePoint({"highest": 0.1})
-    (given, _), (front, choice) = (solved(wanted, mesh, bryson_denham(), **terms) for mesh in ("fixed", "mended"))
-    assert front[0].verified and again(choice) and not given[0].verified
+    (_, given), (front, choice) = (solved(wanted, mesh, bryson_denham(), **terms) for mesh in ("fixed", "mended"))
+    assert "was found, but not confirmed: simulated, it violates" in given["message"] and not again(given)
+    assert front[0].verified and again(choice) and choice["values"][0] < given["values"][0] - 0.1
     effort, height = front[0].simulated.values()
     assert 1 - 1e-4 < effort / (4 / (9 * height)) < 1.01
     # At the optimum both are as far from what is hoped for.
     one, other = choice["degrees"].values()
     assert one == pytest.approx(other, abs=1e-2) and KEPT_INSIDE in front[0].note and choice["message"] == ""
-
-
-@pytest.mark.slow
-def test_a_skip_entry_is_refined_and_then_moved_inside_its_limits() -> None:
-    mesh = DFET(6, 4)
-    start = payoff(load("skip"), mesh, starts=1)
-    wide = Ranges({"terminal mass": 89006.6, "terminal speed": 7802.88}, {"terminal mass": 36571.0, "terminal speed": 4805.46})
-    wanted = PhysicalProgramming({"terminal mass": Larger.even(89000, 64000), "terminal speed": Larger.even(7800, 5500)})
-    front, choice = solved(wanted, "mended", load("skip"), ranges=wide, start=start, method=mesh)
-    point = front[0]
-    assert not start.verified.any() and point.verified and len(again(choice)) == 1 and ONLY_NEAR not in choice["message"]
-    assert KEPT_INSIDE in point.note and len(point.variables) > 2 * len(start[0].variables)
-    # On the mesh where it began, states were off by a third of their bounds.
-    assert point.objectives["terminal mass"] >= 64000 and point.objectives["terminal speed"] >= 5500 and point.defect < 1e-3
 
 
 # Which of several
