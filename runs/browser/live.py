@@ -242,7 +242,7 @@ class FollowedStudy(Followed):
 
     def answer(self, name: str) -> Answer | None:
         """See `Followed`. The comparison of solvers, which may take minutes, is made once it is asked for."""
-        if name != "measures":
+        if name != "measures" or not self._wanted:
             return super().answer(name)
         with self._measuring:
             wanted = self._wanted

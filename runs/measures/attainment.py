@@ -6,7 +6,7 @@ and counts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import moocore
@@ -18,68 +18,55 @@ from .statistics import summarise
 
 @dataclass(frozen=True, eq=False)
 class Attainment:
-    """The surfaces of n runs."""
+    """The surfaces of n runs, those with empty fronts included."""
 
-    runs: int  # how many, those with empty fronts included
-    # (p, m): The non-dominated corners of the surface that at least k runs attain, minimised, in the order of the first objective; k = 1,
-    # ..., n. Empty where fewer than k runs have points.
-    levels: Mapping[int, np.ndarray]
-    signs: np.ndarray  # (m,): +1 or -1: times this, a corner is in the user's units and senses
+    # (p, m) each, in the user's units and senses: the non-dominated corners of the surface that at least k runs attain, k = 1, ..., n, in
+    # the order of the first objective. Empty where fewer than k runs have points.
+    corners: Sequence[np.ndarray]
+    signs: np.ndarray  # (m,): +1 or -1: times this, a corner is minimised
 
-    def of(self, k: int) -> np.ndarray:
-        """Corners (p, m), in the user's units and senses, of the surface that at least k runs attain."""
-        if not 1 <= k <= self.runs:
-            raise ValueError(f"surfaces are of 1 to {self.runs} runs, not of {k}")
-        return self.levels[k] * self.signs
+    @property
+    def runs(self) -> int:
+        """How many runs there are."""
+        return len(self.corners)
 
     @property
     def best(self) -> np.ndarray:
         """Corners of the surface that any run attains."""
-        return self.of(1)
+        return self.corners[0]
 
     @property
     def median(self) -> np.ndarray:
         """Corners of the surface that half of the runs attain."""
-        return self.of(-(-self.runs // 2))
+        return self.corners[(self.runs - 1) // 2]
 
     @property
     def worst(self) -> np.ndarray:
         """Corners of the surface that all runs attain."""
-        return self.of(self.runs)
+        return self.corners[-1]
 
 
 def attainment(fronts: Sequence[Points]) -> Attainment:
-    """The attainment surfaces of several runs. fronts (p, m)."""
+    """The attainment surfaces of several runs."""
     goals = goals_of(fronts)
     rows = [minimised(front, goals, f"front {i}") for i, front in enumerate(fronts)]
     filled = [part for part in rows if part.size]
-    if not rows:
-        raise ValueError("there is no run to take attainment surfaces of")
     widths = {part.shape[1] for part in filled} | ({len(goals)} if goals else set())
     if not widths:
         raise ValueError("no run has a point: without one, the number of objectives is not known")
     if len(widths) > 1 or not widths <= {2, 3}:
         raise ValueError(f"attainment surfaces are of two or three objectives, the same of all runs, not of {sorted(widths)}")
     m = widths.pop()
-    return Attainment(
-        runs=len(rows),
-        levels=_surfaces(filled, len(rows), m),
-        signs=np.array([goal.sign for goal in goals]) if goals else np.ones(m),
-    )
-
-
-def _surfaces(filled: Sequence[np.ndarray], runs: int, m: int) -> dict[int, np.ndarray]:
-    """All surfaces of runs that have points, and empty ones for as many runs as have none."""
-    levels = {k: np.empty((0, m)) for k in range(1, runs + 1)}
+    signs = np.array([goal.sign for goal in goals]) if goals else np.ones(m)
+    corners = [np.empty((0, m))] * len(rows)
     if filled:
         # moocore 0.3.2 loses points unless the numbers of the sets increase from row to row.
-        sets = np.repeat(np.arange(len(filled)), [len(part) for part in filled])
-        table = moocore.eaf(np.vstack(filled), sets)
-        attained = np.rint(table[:, m] * len(filled) / 100).astype(int)
+        found = moocore.eaf(np.vstack(filled), np.repeat(np.arange(len(filled)), [len(part) for part in filled]))
+        attained = np.rint(found[:, m] * len(filled) / 100).astype(int)
         for k in range(1, len(filled) + 1):
-            corners = table[attained == k, :m]
-            levels[k] = corners[np.lexsort(corners.T[::-1])]
-    return levels
+            own = found[attained == k, :m]
+            corners[k - 1] = own[np.lexsort(own.T[::-1])] * signs
+    return Attainment(corners, signs)
 
 
 def staircase(corners: np.ndarray, signs: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -122,13 +109,9 @@ def band(histories: Sequence[History], *, larger: bool = False, moments: int = 4
     grid = np.unique(np.concatenate([x for x, _ in runs]))
     if len(grid) > moments:
         grid = grid[np.unique(np.linspace(0, len(grid) - 1, moments).astype(int))]
-    values = np.array([at(x, y, grid) for x, y in runs])
+    # The place of the last sample at each moment: none before the first.
+    last = [np.searchsorted(x, grid, side="right") - 1 for x, _ in runs]
+    values = np.array([np.where(k >= 0, y[np.maximum(k, 0)], np.nan) for k, (_, y) in zip(last, runs, strict=True)])
     found = [summarise(column, larger=larger) for column in values.T]
     lower, median, upper = (np.array([getattr(s, name) for s in found]) for name in ("lower", "median", "upper"))
     return Band(grid, lower, median, upper, len(runs))
-
-
-def at(x: np.ndarray, y: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """Value of one run at some moments: that of its last sample; NaN before the first."""
-    last = np.searchsorted(x, moments, side="right") - 1
-    return np.where(last >= 0, y[np.maximum(last, 0)], np.nan)

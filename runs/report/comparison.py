@@ -132,14 +132,10 @@ class Comparison:
 
     def only(self, solver: str) -> Comparison:
         """The same of one solver alone."""
-        return replace(
-            self,
-            runs={solver: self.runs[solver]},
-            fronts={solver: self.fronts[solver]},
-            counting={solver: self.counting[solver]},
-            failures={solver: self.failures.get(solver, 0)},
-            left_out={solver: self.left_out.get(solver, 0)},
-        )
+        own: dict[str, Any] = {
+            name: {solver: getattr(self, name)[solver]} for name in ("runs", "fronts", "counting", "failures", "left_out")
+        }
+        return replace(self, **own)
 
     def union(self) -> Reference:
         """The non-dominated points of all runs. Raises ValueError if there are none.

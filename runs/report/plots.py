@@ -110,7 +110,7 @@ def attainment_figure(
     if len(goals) != 2:
         raise ValueError(f"attainment surfaces are drawn of two objectives, not of {len(goals)}")
     signs = np.array([goal.sign for goal in goals])
-    corners = [surface.of(k) for surface in surfaces.values() for k in range(1, surface.runs + 1)]
+    corners = [one for surface in surfaces.values() for one in surface.corners]
     if reference is not None:
         corners.append(truth(reference, goals) * signs)
     every = np.vstack([*corners, np.zeros((0, 2))])

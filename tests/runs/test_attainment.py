@@ -27,7 +27,7 @@ def test_two_runs_by_hand():
 
 def test_an_empty_front_attains_nothing():
     found = attainment([A, EMPTY, B])
-    assert found.runs == 3 and found.of(2).tolist() == [[2, 3], [3, 2]] and found.worst.shape == (0, 2)
+    assert found.runs == 3 and found.corners[1].tolist() == [[2, 3], [3, 2]] and found.worst.shape == (0, 2)
     assert found.median.tolist() == [[2, 3], [3, 2]]
     nothing = attainment([foreign(EMPTY, GOALS)] * 2)
     assert nothing.best.shape == (0, 2) and nothing.worst.shape == (0, 2)
@@ -43,23 +43,21 @@ def test_as_moocore_and_the_definition_have_them(m, runs):
     attained = sum((front[:, None] <= anywhere).all(axis=2).any(axis=0).astype(int) for front in fronts)
     for k in range(1, runs + 1):
         theirs = moocore.eaf(np.vstack(fronts), sets, percentiles=[100 * k / runs])[:, :m]
-        assert sorted(found.of(k).tolist()) == sorted(theirs.tolist())
-        assert nondominated(found.of(k)).all()
-        assert ((found.of(k)[:, None] <= anywhere).all(axis=2).any(axis=0) == (attained >= k)).all()
+        assert sorted(found.corners[k - 1].tolist()) == sorted(theirs.tolist())
+        assert nondominated(found.corners[k - 1]).all()
+        assert ((found.corners[k - 1][:, None] <= anywhere).all(axis=2).any(axis=0) == (attained >= k)).all()
 
 
 def test_senses_and_what_did_not_converge():
     runs = [foreign(front * [1, -1], GOALS) for front in (A, B)]
     found, plain = attainment(runs), attainment([A, B])
     for k in (1, 2):
-        assert (found.of(k) * [1, -1]).tolist() == plain.of(k).tolist()
+        assert (found.corners[k - 1] * [1, -1]).tolist() == plain.corners[k - 1].tolist()
     mixed = attainment([runs[0], B * [1, -1]])
     assert mixed.worst.tolist() == found.worst.tolist()
 
 
 def test_what_has_no_surfaces():
-    with pytest.raises(ValueError, match="no run"):
-        attainment([])
     with pytest.raises(ValueError, match="not known"):
         attainment([EMPTY])
     with pytest.raises(ValueError, match=r"two or three objectives, the same of all runs, not of \[4\]"):

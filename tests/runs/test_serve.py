@@ -77,16 +77,12 @@ class Client:
         assert (answer.status, answer.headers["Content-Type"]) == (200, "application/json"), path
         return json.loads(answer.content)
 
-    def until(self, condition, path: str = "/status.json"):
-        """The first answer of which a condition holds."""
-        ends = time.monotonic() + 20
-        while True:
-            found = self.json(path)
-            if condition(found):
-                return found
-            assert time.monotonic() < ends, found
-            self.json("/status.json")
-            time.sleep(0.02)
+    def seen(self, condition, path: str = "/status.json"):
+        """What a path has after one look at the files."""
+        self.json("/status.json")
+        found = self.json(path)
+        assert condition(found), found
+        return found
 
 
 @contextmanager
@@ -95,7 +91,7 @@ def served(path: Path, trust: bool = False, host: str = "127.0.0.1"):
     threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
     try:
         client = Client(server)
-        client.until(lambda status: "data" in status["versions"])
+        client.seen(lambda status: "data" in status["versions"])
         yield client
     finally:
         server.shutdown()
@@ -121,7 +117,7 @@ def test_the_routes_have_what_the_report_has_and_nothing_is_written(out):
         assert "the root of all evil" in data["failures"][0]["reason"] and "Traceback" in data["failures"][0]["traceback"]
         details = client.json(f"/details/{run['block']}.json")
         assert len(details) == len(front) and details[0]["phases"][0]["name"] == "leg"
-        measures = client.until(lambda found: found["finished"] == 1, "/measures.json")
+        measures = client.seen(lambda found: found["finished"] == 1, "/measures.json")
         assert measures["comparisons"][comparison["id"]]["tables"]
         page = client.ask("/").content.decode()
         assert "gliders &lt;b&gt;" in page and "gliders <b>" not in page
@@ -203,19 +199,19 @@ def test_files_that_are_damaged_or_gone_are_named_and_the_server_goes_on(out):
     with served(out) as client:
         whole = (out / "study.json").read_bytes()
         (out / "study.json").write_bytes(whole[:100])
-        assert "study.json" in client.until(lambda status: status["trouble"])["trouble"]
+        assert "study.json" in client.seen(lambda status: status["trouble"])["trouble"]
         assert client.json("/data.json")["comparisons"][0]["runs"]  # what was seen before stays
         (out / "study.json").unlink()
-        assert "no study" in client.until(lambda status: "no study" in status["trouble"])["trouble"]
+        assert "no study" in client.seen(lambda status: "no study" in status["trouble"])["trouble"]
         (out / "study.json").write_bytes(whole)
-        client.until(lambda status: not status["trouble"])
+        client.seen(lambda status: not status["trouble"])
         front = next(out.rglob("*.nc"))
         half = front.read_bytes()[:1000]
         front.write_bytes(half)
-        client.until(lambda status: (status["finished"], status["failed"]) == (0, 2))
-        assert any("damaged" in one["reason"] for one in client.until(lambda found: len(found["failures"]) == 2, "/data.json")["failures"])
+        client.seen(lambda status: (status["finished"], status["failed"]) == (0, 2))
+        assert any("damaged" in one["reason"] for one in client.seen(lambda found: len(found["failures"]) == 2, "/data.json")["failures"])
         shutil.rmtree(out)
-        assert "there is no folder" in client.until(lambda status: "no folder" in status["trouble"])["trouble"]
+        assert "there is no folder" in client.seen(lambda status: "no folder" in status["trouble"])["trouble"]
         assert client.ask("/").status == 200
 
 
@@ -228,7 +224,7 @@ def test_code_that_only_a_file_names_is_not_run(tmp_path, monkeypatch):
     mark = tmp_path / "it_ran"
     (tmp_path / "rocket.py").write_text(f"from pathlib import Path\nPath({str(mark)!r}).touch()\n", encoding="utf-8")
     with served(tmp_path / "out") as client:
-        measures = client.until(lambda found: found["trouble"], "/measures.json")
+        measures = client.seen(lambda found: found["trouble"], "/measures.json")
         assert "--trust" in measures["trouble"]
         (run,) = client.json("/data.json")["comparisons"][0]["runs"]
         assert run["points"]["count"] and client.json(f"/details/{run['block']}.json")
@@ -247,13 +243,13 @@ def test_the_points_so_far_of_runs_that_have_not_ended_are_shown(out):
     with served(out) as client, StudyDisplay("a", [run], [run], False, folder=out, goals=stated.objectives) as display:
         display.reporter(run)(31, 1.5)
         display.refresh()
-        status = client.until(lambda status: status["running"] == 1)
+        status = client.seen(lambda status: status["running"] == 1)
         assert (status["alive"], status["waiting"]) == (True, 1) and status["left"] > 0.0
         assert status["going"] == [{"name": f"{cell.name}, run 2", "evaluations": 31, "budget": 60, "elapsed": 1.5}]
         (points,) = client.json("/going.json")["glide, dfet:2x2"]
         assert points == {"solver": "plain", "number": 2, "objectives": [[1.0, 2.0], [3.0, 6.0]]}  # in the user's senses
         run.path.with_suffix(".samples").write_bytes(b'{"crc32": 1, "con')  # half written
-        client.until(lambda found: not found["glide, dfet:2x2"], "/going.json")
+        client.seen(lambda found: not found["glide, dfet:2x2"], "/going.json")
         assert not client.json("/status.json")["trouble"]
     with served(out) as client:
         assert client.json("/status.json")["alive"] is False and client.json("/going.json") == {"glide, dfet:2x2": []}
@@ -266,7 +262,7 @@ def test_before_the_first_run_has_ended_the_objectives_are_known(tmp_path):
     folder = tmp_path / "out"
     with StudyDisplay("a", [], [], False, folder=folder, goals=stated.objectives) as display, served(folder) as client:
         display.refresh()
-        data = client.until(lambda found: found["comparisons"], "/data.json")
+        data = client.seen(lambda found: found["comparisons"], "/data.json")
         assert [goal["name"] for goal in data["comparisons"][0]["goals"]] == ["time", "distance"]
         assert data["comparisons"][0]["runs"] == [] and client.json("/status.json")["waiting"] == 2
 
@@ -292,17 +288,17 @@ def test_fronts_are_followed_one_alone_and_those_of_a_folder(tmp_path):
     with served(tmp_path / "first.nc") as client:
         assert client.json("/data.json")["kind"] == "front"
         flights(4).save(tmp_path / "first.nc")
-        client.until(lambda found: found["comparisons"][0]["runs"][0]["points"]["count"] == 4, "/data.json")
+        client.seen(lambda found: found["comparisons"][0]["runs"][0]["points"]["count"] == 4, "/data.json")
         (tmp_path / "first.nc").write_bytes(b"half")
-        assert "first.nc" in client.until(lambda status: status["trouble"])["trouble"]
+        assert "first.nc" in client.seen(lambda status: status["trouble"])["trouble"]
         flights(4).save(tmp_path / "first.nc")
-        client.until(lambda status: not status["trouble"])
+        client.seen(lambda status: not status["trouble"])
     with served(tmp_path) as client:
         assert client.json("/data.json")["kind"] == "fronts"
         flights(5, seed=1).save(tmp_path / "second.nc")
         black_box(4).save(tmp_path / "other.nc")
         (tmp_path / "text.nc").write_text("no front", encoding="utf-8")
-        data = client.until(lambda found: len(found["comparisons"]) == 2 and found["unreadable"], "/data.json")
+        data = client.seen(lambda found: len(found["comparisons"]) == 2 and found["unreadable"], "/data.json")
         assert {tuple(one["solvers"]) for one in data["comparisons"]} == {("first", "second"), ("other",)}
         assert "text.nc" in data["unreadable"][0]
 
