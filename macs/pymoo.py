@@ -35,7 +35,8 @@ from problems.vector import CompiledVectorProblem
 from .evaluation.blackbox import BlackBox, plain_problem
 from .evaluation.evaluator import FAILED, Evaluation
 from .search.macs import MACS as Search  # noqa: N811 - a class
-from .search.rounds import PLANNED, Rounds
+from .search.rounds import PLANNED_EVALUATIONS, Rounds
+from .search.settings import refuse_gone
 from .search.state import SearchState
 from .solvers.run import IDLE_ITERATIONS
 from .solvers.start import decisions
@@ -62,12 +63,12 @@ class MACS(Algorithm):
     archive : int, default 100
         Largest number of points in the result, at least the number of objectives; `macs.MACS` has 10 by default. (An archive of pymoo's
         own, which collects what was evaluated, is an argument of `minimize`: `minimize(problem, MACS(), archive=MultiObjectiveArchive())`.)
-    rho, F, CR, ..., exponent, prefer
+    refine, polish_on, mesh, mesh_tolerance, prefer, polish_every, ceiling, variant
         All other settings of `macs.MACS`, with its defaults and errors: see `help(macs.MACS)`. Those for derivatives and meshes do nothing
         here, as on any plain function, but `mesh="adaptive"` and `polish_on` are refused as soon as the problem is known. `ceiling` does
         nothing, either: the termination decides when to end.
     sampling : array (k, d), Population or Sampling, optional
-        First points, inside the bounds. If they are fewer than the first population (the setting `sample`), the rest is drawn; the best of
+        First points, inside the bounds. If they are fewer than the first population, the rest is drawn; the best of
         all become agents. Points of a Population that are already evaluated are not evaluated again. Default: a Latin hypercube.
     output : Output, optional
         What `verbose=True` prints. Default: pymoo's columns for one objective, or for several.
@@ -115,6 +116,7 @@ class MACS(Algorithm):
 
     def __init__(self, *, sampling: Any = None, output: Any = None, **settings: Any) -> None:
         options = {name: settings.pop(name) for name in OPTIONS if name in settings and name not in SETTINGS}
+        refuse_gone(settings)
         for name in settings:
             if name not in SETTINGS:
                 raise TypeError(unknown("setting of MACS", name, dict.fromkeys(("sampling", *SETTINGS, *OPTIONS))))
@@ -233,7 +235,7 @@ class MACS(Algorithm):
             start = decisions(self._given.get("X"), self._compiled.variables) if len(self._given) else None
             return self.search.begin(evaluator, self._budget, copy.deepcopy(self.random_state), start), evaluator
         evaluator.counts.evaluations = state.evaluations
-        state.rounds = None if self._planned else state.rounds or Rounds.first(self.problem.n_obj, PLANNED, PLANNED)
+        state.rounds = None if self._planned else state.rounds or Rounds.first(self.problem.n_obj, False, PLANNED_EVALUATIONS)
         self.search.advance(state, evaluator, self._budget)
         return state, evaluator
 
@@ -245,11 +247,11 @@ class MACS(Algorithm):
             self._budget = int(min(self._state.evaluations + left, sys.maxsize))
             return
         if self.sampling is not None:
-            count = self.search.points_to_sample(int(left if self._planned else min(left, PLANNED)))
+            count = self.search.points_to_sample(int(left if self._planned else min(left, PLANNED_EVALUATIONS)))
             self._given = self._first(count)
         skipped = sum(all(what in one.evaluated for what in self.evaluator.evaluate_values_of) for one in self._given)
         left += skipped if self.evaluator.skip_already_evaluated else 0
-        self._budget = int(left if self._planned else min(left, max(PLANNED, len(self._given))))
+        self._budget = int(left if self._planned else min(left, max(PLANNED_EVALUATIONS, len(self._given))))
 
     def _first(self, count: int) -> Population:
         """The points that are given, or those that pymoo's Sampling draws, inside the bounds."""

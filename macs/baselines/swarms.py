@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..evaluation.evaluator import Box, Evaluator
+from ..evaluation.evaluator import Evaluator, UnitBox
 from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
 from .constraints import excess
@@ -204,12 +204,12 @@ class MOPSO(PopulationSolver):
         if state.launched >= 0 and len(state.archive):
             state.means = np.vstack([state.means, state.archive.F.mean(axis=0)])[-SETTLING - 1 :]
 
-    def has_settled(self, state: ParticleState) -> bool:
-        """See `SearchMethod.has_settled`."""
+    def ended(self, state: ParticleState) -> str:
+        """See `SearchMethod.ended`."""
         if len(state.means) <= SETTLING:
-            return False
+            return ""
         now = state.means[-1]
-        return bool((np.abs(state.means - now) < self.settled * np.abs(now)).all())
+        return "settled" if (np.abs(state.means - now) < self.settled * np.abs(now)).all() else ""
 
     def _goals(self, points: Members, tolerance: float) -> np.ndarray:
         """Objectives (n, m) that include the violation; see `constraints.by_objectives`."""
@@ -361,7 +361,7 @@ def thin_out(cube: np.ndarray, limit: int, rng: np.random.Generator) -> np.ndarr
 
 
 def velocities(
-    box: Box,
+    box: UnitBox,
     X: np.ndarray,
     V: np.ndarray,
     best: np.ndarray,
@@ -381,7 +381,7 @@ def velocities(
     return np.clip(V, -largest, largest)
 
 
-def moved(box: Box, X: np.ndarray, V: np.ndarray, rebound: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def moved(box: UnitBox, X: np.ndarray, V: np.ndarray, rebound: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (n, d) after a time step of 1.
 
     A coordinate that leaves the box is set to the bound, and its velocity is multiplied by `rebound` (n, d), in [-1, 0]. A periodic

@@ -25,7 +25,7 @@ __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation
 
 
 @dataclass(frozen=True)
-class Box:
+class UnitBox:
     """Bounds of the free variables, and the arithmetic of points and steps inside them.
 
     Points are rows X in unit coordinates: 0 at the lower bound, 1 at the upper one. So distances are in spans, whatever the units of the
@@ -246,9 +246,9 @@ class Evaluator(ABC):
     before_batch: Callable[[], Any] = staticmethod(lambda: None)
 
     @property
-    def box(self) -> Box:
+    def box(self) -> UnitBox:
         """Box of the free variables."""
-        return Box(self.lower, self.upper, self.period > 0.0)
+        return UnitBox(self.lower, self.upper, self.period > 0.0)
 
     @property
     def sizes(self) -> dict[str, int]:

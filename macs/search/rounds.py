@@ -17,98 +17,68 @@ from ..pareto.directions import tchebycheff
 from ..pareto.dominance import distinct, nondominated, ranges
 from ..pareto.spread import dominated_volume
 
-PLANNED = 2_000
+PLANNED_EVALUATIONS = 2_000
 """Settings that follow from a number of evaluations are those of this one."""
-FIRST, FIRST_WITHOUT = 150, 2_000
-"""Evaluations of the first round, and least number of a later one, with gradients; without."""
-STARTS = 6
-"""A later round begins with one gradient solve from another start for so many of its evaluations."""
-PATIENCE, AGAIN, LONG = 2, 0.25, 8
-"""Where optima are several: evaluations without progress before the search ends, in least rounds, and as a part of what the last progress
-took; and the least rounds that are enough where they took less work than other starts may always take, `WORK.little`."""
-GROWTH = 4
-"""A later round has at least this part, one fourth, of all evaluations before it."""
-SOLVES = 8
-"""Largest number of gradient solves in the polish of a round, for each point that the archive may have."""
-BEYOND = 1e-3
-"""Distance, in ranges of the front, that a point must lie beyond the front to count."""
-PROGRESS = 1e-3
-"""Part by which the hypervolume must grow, or the best values of the directions on average, to be progress."""
-ENDS = 5e-3
-"""Part of its range by which the best value of an objective must fall to be progress."""
-CLOSER = 0.9
-"""As long as nothing is feasible: factor by which the least violation must fall to be progress."""
-JOINED = 0.3
-"""Points of the front that are farther from a point, in ranges, are not joined by lines beside it: there may be a gap."""
-FLAT = 1e-3
-"""Least range of an objective on the front, in that of all feasible agents and points of archives: a front may be one point."""
-ALONE = 0.01
-"""Least range of a single objective, in its size: its front is one point, and starts that end at one optimum have no range."""
 DONE, CEILING = "done", "ceiling"
 """Reasons for the end: further work did not improve the front; the largest number of evaluations."""
 
 
+@dataclass(frozen=True)
+class RoundLimits:
+    """When a round ends, what counts as progress, and when there is no other round (measured on the catalogue and standard problems)."""
+
+    first: int = 150  # evaluations of the first round, and least number of a later one, with gradients
+    first_without: int = 2_000  # the same without
+    growth: int = 4  # a later round has at least this part, one fourth, of all evaluations before it
+    restart: int = 6  # a later round begins with one gradient solve from another start for so many of its evaluations
+    patience: float = 2.0  # where optima are multimodal: least rounds without progress before the search ends,
+    again: float = 0.25  # as a part of the evaluations that the last progress took,
+    long: int = 8  # and least rounds that are enough even where they took less work than other starts may always take, `WORK.little`
+    beyond: float = 1e-3  # distance, in ranges of the front, that a point must lie beyond the front to count
+    progress: float = 1e-3  # part by which the hypervolume must grow, or the best values of the directions on average, to be progress
+    ends: float = 5e-3  # part of its range by which the best value of an objective must fall to be progress
+    closer: float = 0.9  # as long as nothing is feasible: factor by which the least violation must fall to be progress
+    joined: float = 0.3  # points of the front that are farther from a point, in ranges, are not joined by lines beside it
+    flat: float = 1e-3  # least range of an objective on the front, in that of all points found: a front may be one point
+    alone: float = 0.01  # least range of a single objective, in its size: starts that end at one optimum have no range
+
+
+ROUND_LIMITS = RoundLimits()
+
+
 @dataclass
 class Rounds:
-    """State of the rounds of a search.
-
-    Attributes
-    ----------
-    finished : int
-        Number of rounds that have ended.
-    end : int
-        Number of evaluations at which the current round ends.
-    improved, work : int
-        Number of evaluations, and work, at the end of the round that last improved the front.
-    opened : int
-        Number of evaluations at the end of the first round that found anything feasible; 0 before.
-    front : array (k, m)
-        Objectives of all points known then, non-dominated.
-    extent : array (m,)
-        Largest range of each objective over feasible agents and points of the archive so far.
-    violation : float
-        The least violation then, as long as nothing was feasible.
-    due, anew : int
-        Number of gradient solves from other starts with which rounds begin, up to the current one; number of those that were made.
-    stopped : str
-        Why the search is at its end; empty as long as it goes on.
-    """
+    """State of the rounds of a search."""
 
     SHAPES: ClassVar[dict[str, str]] = {"front": "k m", "extent": "m"}
 
-    finished: int
-    end: int
-    improved: int
+    finished: int  # rounds that have ended
+    end: int  # evaluations at which the current round ends
+    improved: int  # evaluations, and work, at the end of the round that last improved the front
     work: int
-    opened: int
-    front: np.ndarray
-    extent: np.ndarray
-    violation: float
-    due: int = 0
-    anew: int = 0
-    stopped: str = ""
+    opened: int  # evaluations at the end of the first round that found anything feasible; 0 before
+    front: np.ndarray  # (k, m): objectives of all points known when the front was last improved, non-dominated
+    extent: np.ndarray  # (m,): largest range of each objective over feasible agents and points of the archive so far
+    violation: float  # the least violation then, as long as nothing was feasible
+    due: int = 0  # gradient solves from other starts with which rounds begin, up to the current one
+    restarts: int = 0  # those that were made
+    stopped: str = ""  # why the search is at its end; empty as long as it goes on
 
     @classmethod
-    def first(cls, m: int, shortest: int, ceiling: int) -> Rounds:
+    def first(cls, m: int, gradients: bool, ceiling: int) -> Rounds:
         """The first round of a search for m objectives."""
-        none = np.empty((0, m))
+        none, shortest = np.empty((0, m)), ROUND_LIMITS.first if gradients else ROUND_LIMITS.first_without
         return cls(finished=0, end=min(shortest, ceiling), improved=0, work=0, opened=0, front=none, extent=np.zeros(m), violation=np.inf)
 
-    def news(self, found: np.ndarray) -> bool:
+    def has_improvement(self, found: np.ndarray) -> bool:
         """Whether any of the points with F (k, m) lies beyond the front, so that a polish may make progress of it."""
         if not (len(found) and len(self.front)):
             return len(found) > 0
         ideal, span = _frame(np.vstack([self.front, found]), self.extent)
-        return bool((beyond((found - ideal) / span, (self.front - ideal) / span) > BEYOND).any())
+        return bool((beyond((found - ideal) / span, (self.front - ideal) / span) > ROUND_LIMITS.beyond).any())
 
 
-def least(gradients: bool) -> tuple[int, float]:
-    """Least number of evaluations of a round, and without progress before the search ends; and least work then, where optima are
-    several."""
-    return (FIRST, WORK.little) if gradients else (FIRST_WITHOUT, 0.0)
-
-
-def judged(
+def next_round(
     rounds: Rounds,
     found: np.ndarray,
     feasible: np.ndarray,
@@ -116,46 +86,46 @@ def judged(
     directions: np.ndarray,
     evaluations: int,
     work: int,
-    shortest: int,
-    little: float,
+    gradients: bool,
+    multimodal: bool,
     ceiling: int,
-    several: bool,
 ) -> Rounds:
-    """The rounds after one has ended: with the next one, or the reason why there is none. found (k, m), feasible (a, m), directions (d,
-    m)."""
+    """The rounds after one has ended that found objectives (k, m), with feasible agents (a, m): with the next one, or the reason why there
+    is none."""
+    shortest, little = (ROUND_LIMITS.first, WORK.little) if gradients else (ROUND_LIMITS.first_without, 0.0)
     seen = np.vstack([found, feasible])
     extent = np.fmax(rounds.extent, np.ptp(seen, axis=0)) if len(seen) else rounds.extent
     rounds = replace(rounds, finished=rounds.finished + 1, extent=extent)
     if len(rounds.front):
         better = improves(found, rounds.front, extent, directions)
     else:
-        better = len(found) > 0 or violation < CLOSER * rounds.violation
+        better = len(found) > 0 or violation < ROUND_LIMITS.closer * rounds.violation
     if better:
         known = np.vstack([rounds.front, found])
         known = known[distinct(known, ranges(known))] if len(known) else known
         opened = rounds.opened or (evaluations if len(known) else 0)
         rounds = replace(rounds, improved=evaluations, work=work, opened=opened, front=known, violation=violation)
-    several = several or rounds.improved > rounds.opened
-    patience = max(PATIENCE * shortest, AGAIN * rounds.improved) if several else shortest
+    multimodal = multimodal or rounds.improved > rounds.opened
+    patience = max(ROUND_LIMITS.patience * shortest, ROUND_LIMITS.again * rounds.improved) if multimodal else shortest
     fruitless = evaluations - rounds.improved
-    if fruitless >= patience and (not several or work - rounds.work >= little or fruitless >= LONG * shortest):
+    if fruitless >= patience and (not multimodal or work - rounds.work >= little or fruitless >= ROUND_LIMITS.long * shortest):
         return replace(rounds, stopped=DONE)
     if evaluations >= ceiling:
         return replace(rounds, stopped=CEILING)
-    end = min(evaluations + max(shortest, evaluations // GROWTH), ceiling)
-    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // STARTS)
+    end = min(evaluations + max(shortest, evaluations // ROUND_LIMITS.growth), ceiling)
+    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // ROUND_LIMITS.restart)
 
 
 def improves(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> bool:
     """Whether points with F (k, m) improve a front (n, m): the gains of those that lie beyond it are more than little."""
     hypervolume, mean, end = gains(found, front, extent, directions)
-    return hypervolume > PROGRESS or mean > PROGRESS or end > ENDS
+    return hypervolume > ROUND_LIMITS.progress or mean > ROUND_LIMITS.progress or end > ROUND_LIMITS.ends
 
 
 def gains(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> tuple[float, float, float]:
     """The gains by points with F (k, m) that lie beyond a front (n, m)."""
     ideal, span = _frame(np.vstack([front, found]), extent)
-    new = found[beyond((found - ideal) / span, (front - ideal) / span) > BEYOND]
+    new = found[beyond((found - ideal) / span, (front - ideal) / span) > ROUND_LIMITS.beyond]
     if not len(new):
         return 0.0, 0.0, 0.0
     both = np.vstack([front, new])
@@ -168,9 +138,9 @@ def gains(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: 
 def _frame(F: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ideal point and ranges (m,) of the best of points with F (k, m), by which a front is normalised."""
     best = F[nondominated(F)]
-    span = np.maximum(np.ptp(best, axis=0), FLAT * extent)
+    span = np.maximum(np.ptp(best, axis=0), ROUND_LIMITS.flat * extent)
     if F.shape[1] == 1:
-        span = np.maximum(span, ALONE * np.abs(best).max(axis=0))
+        span = np.maximum(span, ROUND_LIMITS.alone * np.abs(best).max(axis=0))
     return best.min(axis=0), np.where(span > 0.0, span, ranges(best))
 
 
@@ -178,7 +148,9 @@ def beyond(F: np.ndarray, front: np.ndarray) -> np.ndarray:
     """Distances (k,) that points F (k, m) lie beyond a front (n, m): by how much all objectives of a point have to be worse for the front
     to dominate it. Points of the front that are near are joined by straight lines, or planes. All are normalised."""
     alone = np.array([(front - point).max(axis=1).min() for point in F])
-    return np.array([_joined(point, front, far) if far > BEYOND else far for point, far in zip(F, alone.tolist(), strict=True)])
+    return np.array(
+        [_joined(point, front, far) if far > ROUND_LIMITS.beyond else far for point, far in zip(F, alone.tolist(), strict=True)]
+    )
 
 
 def _joined(point: np.ndarray, front: np.ndarray, alone: float) -> float:
@@ -187,7 +159,7 @@ def _joined(point: np.ndarray, front: np.ndarray, alone: float) -> float:
 
     m, apart = len(point), np.linalg.norm(front - point, axis=1)
     rows = np.argsort(apart, kind="stable")[: 4 * m]
-    near = front[rows[apart[rows] <= JOINED]]
+    near = front[rows[apart[rows] <= ROUND_LIMITS.joined]]
     if len(near) <= 1:
         return alone
     # The least t such that a mean of the near points, with weights w, is no worse than the point by more than t.

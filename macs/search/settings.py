@@ -1,9 +1,9 @@
-"""Settings of MACS: each parameter with its range, its default and its value in the paper."""
+"""Settings of MACS, and the variants of its search: its own and that of the paper."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from math import ceil
 from typing import Any, Self
 
@@ -17,36 +17,94 @@ from ..pareto.niches import MANY
 from ..preferences.catalogue import from_dict
 from ..preferences.preference import Preference
 
-SOME, GENERATION, GENERATIONS = 0.15, 1.0, 2.0
-"""Defaults of `breeding`: few offspring, which leave most of the budget to the agents; one of each point; two of each."""
-FEW_POINTS = 10
-"""Points of an archive up to which, by default, all agents have a direction."""
-LONG, ALONE, ALONE_SURFACE = 30_000, 6000, 12_000
-"""Budget up to which, by default, all agents have a direction; evaluations beyond it for each of which there is one without, where the
-front is a curve or a surface."""
-SHARE = 8
-"""Pattern search takes at most this part, one eighth, of the budget in one iteration."""
-LEAST = {"agents": 3, "archive": 1, "max_contractions": 0, "memory": 1, "refine_every": 1, "polish_every": 1, "ceiling": 1}
+MESH_WORDS = ("mended", "fixed", "adaptive")
+"""What may be done with points that a simulation does not confirm."""
+LEAST_COUNTS = {"agents": 3, "archive": 1, "polish_every": 1, "ceiling": 1}
 """Least value of each whole number."""
-INTERVALS = {
-    "rho": "(0, 1]",
-    "F": "(0, 2]",
-    "CR": "[0, 1]",
-    "social": "[0, 1]",
-    "contraction": "(0, 1)",
-    "coordinates": "(0, 1]",
-    "momentum": "[0, 1)",
-    "concentration": "[1, 10]",
-    "experience": "[0, 1]",
-    "breeding": "[0, 10]",
-    "mesh_tolerance": "[1e-10, 1]",
-    "exponent": "[1, 16]",
+ELSEWHERE = "it is that of the search, see macs.search.settings.Variant; MACS.paper() has that of the paper"
+GONE = {
+    **dict.fromkeys(
+        ("rho", "F", "CR", "contraction", "max_contractions", "adaptive_coordinates", "redraw", "reseed", "shorten"), ELSEWHERE
+    ),
+    **dict.fromkeys(("social_moves", "keep_velocity", "breeding", "restore", "exponent", "lone", "directions", "sample"), ELSEWHERE),
+    **dict.fromkeys(("momentum", "concentration", "experience", "memory", "keep_velocity"), "it brought no more than noise; leave it out"),
+    "social": "all agents do social actions; leave it out",
+    "coordinates": "leave it out, or use MACS.paper(), which scans all coordinates",
+    "refine_every": "one gradient solve of an agent follows every 200 evaluations; use polish_every for their largest number",
 }
-"""Interval of each number."""
-MESHES = ("mended", "fixed", "adaptive")
-"""Kinds of mesh."""
-OPTIONAL = ("breeding", "exponent")
-"""Numbers that may be None."""
+"""Settings of former versions, and what to use instead."""
+
+
+def refuse_gone(settings: Iterable[str]) -> None:
+    """Raise ValueError that says what to use, if one of these names is a setting of a former version."""
+    for name in settings:
+        if name in GONE:
+            raise ValueError(f"MACS: {name} is no setting any more: {GONE[name]}")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """How agents move and what the archive keeps; the defaults are those of `MACS()`. `docs/method/parts.md` has what each part brings."""
+
+    F: float = 0.9  # weight of differences of points, probability that a coordinate takes part (Table I of the paper)
+    CR: float = 0.9
+    rho: float = 1.0  # radius of the pattern search, in half spans, at the beginning (Table I)
+    contraction: float = 0.5  # its factor after a failure of all actions (Table I)
+    max_contractions: int = 5  # their number after which the radius is reset (Table I)
+    adaptive_coordinates: bool = True  # pattern search tries the fewer coordinates, the fuller the archive (the authors' later code)
+    redraw: bool = True  # directions are drawn anew in each iteration, from 100 for each objective (the authors' later code)
+    shorten: bool = False  # steps of inertia end in the box, as in the paper; else each variable is clipped
+    social_moves: bool = True  # agents move to the points of successful social actions; in the paper these go to the archive only
+    refine_every: int = 200  # evaluations for each of which one gradient solve of an agent follows
+    breeding: bool = True  # points of the archive have offspring
+    repair: bool = True  # infeasible points move to where linear models of the constraints vanish
+    undirected: bool = True  # long searches have agents without a direction
+    energy_alone: bool = False  # the archive is spread by the energy of power 2, as in the paper, without volume and niches
+
+    @property
+    def energy_exponent(self) -> float | None:
+        """The power of the distance in the energy that spreads the archive; None: what suits the number of objectives."""
+        return 2.0 if self.energy_alone else None
+
+
+PAPER = Variant(
+    adaptive_coordinates=False,
+    redraw=False,
+    shorten=True,
+    social_moves=False,
+    breeding=False,
+    repair=False,
+    undirected=False,
+    energy_alone=True,
+)
+"""The search of Ricciardi and Vasile (2015)."""
+VARIANTS = {"default": Variant(), "paper": PAPER}
+"""Variants by their names in files."""
+
+
+@dataclass(frozen=True)
+class Undirected:
+    """When agents without a direction join (measured on UF1 to UF10 of CEC 2009)."""
+
+    long: int = 30_000  # evaluations up to which all agents have a direction
+    each: int = 6_000  # evaluations beyond that for each of which there is one without, where the front is a curve
+    each_surface: int = 12_000  # the same where it is a surface
+    few_points: int = 10  # points of an archive up to which there is none
+
+
+UNDIRECTED = Undirected()
+
+
+@dataclass(frozen=True)
+class Offspring:
+    """Offspring of each point of the archive in an iteration (measured on ZDT, UF, DTLZ and MW)."""
+
+    curve: float = 0.15  # with up to two objectives, or beside agents without a direction: most of the budget is left to the agents
+    surface: float = 1.0
+    infeasible: float = 2.0  # of the least violated points, as long as nothing is feasible
+
+
+OFFSPRING = Offspring()
 
 
 @dataclass(frozen=True)
@@ -55,11 +113,12 @@ class Settings:
 
     In each iteration the agents look for better points: first each by itself (individual actions), then with the information of all (social
     actions). The best trade-offs are kept in an archive and spread evenly along the front; offspring of the archive's points add to the
-    search. If the problem has derivatives, gradient solves refine agents during the search and polish the archive at its end.
+    search. If the problem has derivatives, gradient solves find the ends of the front at the beginning, refine agents during the search and
+    polish the archive at its end.
 
-    `MACS()` suits most problems. Five settings matter first: `agents`, `archive`, `refine`, `mesh` and `prefer`; all others are further
-    settings, under Other Parameters. `MACS(refine=False)` makes no gradient solves. `MACS.paper()` has the settings of the paper (Ricciardi
-    and Vasile 2015; with trajectories: Ricciardi, Vasile and Maddock 2016); values of its Table I are given below.
+    `MACS()` suits most problems. Five settings matter first: `agents`, `archive`, `refine`, `mesh` and `prefer`. `MACS(refine=False)` makes
+    no gradient solves. `MACS.paper()` is the search of the paper (Ricciardi and Vasile 2015; with trajectories: Ricciardi, Vasile and
+    Maddock 2016).
 
     Parameters
     ----------
@@ -69,109 +128,41 @@ class Settings:
         Largest number of points in the archive, and so on the front. At least the number of objectives; the best point of each objective is
         always kept (with more than three objectives, to a millionth of its range).
     refine : bool, default True
-        Use derivatives, if the problem has them (a black box has none): gradient solves of single agents during the search, see
-        `refine_every`, and a polish of the archive at its end, see `polish_every`. Points then have their `optimality`.
+        Use derivatives, if the problem has them (a black box has none): gradient solves of single agents during the search, one for 200
+        evaluations, and a polish of the archive at its end, see `polish_every`. Points then have their `optimality`.
         `stats["gradient_solves"]` counts all solves.
-    mesh : {"mended", "fixed", "adaptive"}, default "mended"
-        What is done after the search, unless it was ended by Ctrl-C, a time limit or a callback, for optimal control problems. "mended":
-        points that a simulation does not confirm are solved again on finer meshes, see `Front.mended`. "fixed": all points stay on the mesh
-        of the search. "adaptive": each point is solved on a mesh of its own until a simulation confirms it, see `Front.refine_mesh`.
-        With `refine=False` points are not mended.
-    prefer : Preference or dict, optional
-        What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
-        the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
-        sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
-        not reach the values that the preference names, the search is even; in the end `stats["prefer"]` says so.
-
-    Other Parameters
-    ----------------
     polish_on : str, optional
         Another transcription for all gradient solves, such as "dfet:30x3:bernstein:1": search where candidates are evaluated quickly
         (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
         agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
         polished again each time.
+    mesh : {"mended", "fixed", "adaptive"}, default "mended"
+        What is done after the search, unless it was ended by Ctrl-C, a time limit or a callback, for optimal control problems. "mended":
+        points that a simulation does not confirm are solved again on finer meshes, see `Front.mended`. "fixed": all points stay on the mesh
+        of the search. "adaptive": each point is solved on a mesh of its own until a simulation confirms it, see `Front.refine_mesh`.
+        With `refine=False` points are not mended.
     mesh_tolerance : float, default 1e-7
         With `mesh="adaptive"`: largest difference between a simulated state and that of the transcription, in spans of its bounds, in
         [1e-10, 1].
-    rho : float, default 1.0
-        Initial radius of the pattern search, in (0, 1], as a fraction of half the span of each variable (Table I: 1).
-    F : float, default 0.9
-        Weight of the differences in differential evolution, in (0, 2] (Table I: 0.9).
-    CR : float, default 0.9
-        Probability that a coordinate changes in differential evolution, in [0, 1] (Table I: 0.9).
-    social : float, default 1.0
-        Fraction of the agents that do social actions, each for a direction of its own, in [0, 1] (Table I: 1). If they would be fewer than
-        the objectives, no agent does.
-    contraction : float, default 0.5
-        Factor by which the radius shrinks when all actions of an agent failed, in (0, 1) (Table I: 0.5).
-    max_contractions : int, default 5
-        Number of contractions after which the radius is reset, at least 0 (Table I: 5).
-    coordinates : float, default 1.0
-        Fraction of the coordinates that pattern search tries, in (0, 1], if `adaptive_coordinates` is off (Table I: 1).
-    adaptive_coordinates : bool, default True
-        Pattern search tries all coordinates while the archive is empty, and one when it is full (the authors' later code). As long as
-        nothing is feasible the least violated points, as many as the archive may have, stand for it, unless `breeding` is 0. An iteration
-        takes at most an eighth of the budget for it.
-    lone : int, optional
-        Number of further agents, which have no direction, at least 0: they do individual actions only, and stay where these lead. So they
-        reach parts of the front that the archive, which keeps what is non-dominated at the moment, has lost. In an iteration as many of
-        them act as there are `agents`, as long as they gain as much in an evaluation; the less they gain, the rarer. Default: one for each
-        6000 evaluations of the budget beyond 30 000, with three objectives 12 000, at most half as many as the points of `archive` beyond
-        10, and none with more than three objectives. 0 in the paper. There are never more agents than points in the first population.
-    directions : int, optional
-        Number of directions that those of the agents are drawn from, at least 1. Default: 100 for each objective (the authors' later code).
-    redraw : bool, default True
-        Draw the agents' directions anew in each iteration. False: they keep their first directions, as in the paper.
-    reseed : {"all", "spread"}, default "all"
-        Points of the archive that agents are moved to: all, or only as many as there are agents, well spread. With "spread", agents are
-        also moved to an archive with fewer points than objectives, the nearest agents first (the authors' later code).
-    momentum : float, default 0.7
-        Part of the last velocity that is added to the displacement of a success, in [0, 1). 0 in the paper.
-    concentration : float, default 1.5
-        Exponent of the step lengths of pattern search, in [1, 10]: the radius times a uniform number to this power. A higher value gives
-        more short steps. 1 in the paper.
-    experience : float, default 0.3
-        Probability that a social agent repeats past improvements of all agents, in [0, 1]. 0 in the paper.
-    memory : int, default 100
-        Number of improvements that are kept for `experience`, at least 1.
-    shorten : bool, default False
-        Shorten steps of inertia so that they end in the box, as in the paper. False: each variable is clipped to its bounds.
-    social_moves : bool, default True
-        Agents move to the points of successful social actions. False as in the paper: these points are only offered to the archive.
-    keep_velocity : bool, default True
-        Every success gives its agent a velocity. False: only a success of pattern search does (the authors' later code).
-    refine_every : int, default 200
-        During the search, one gradient solve of an agent for so many evaluations, at least 1.
+    prefer : Preference or dict, optional
+        What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
+        the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
+        sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
+        not reach the values that the preference names, points are spread uniformly; in the end `stats["prefer"]` says so.
     polish_every : int, default 20
         At most one gradient solve, those during the search included, for so many evaluations, at least 1; where the search chooses its
         inner level, `inner="auto"`, a polish may always make 60. It needs about six for each point of the archive; with more than two
         objectives, one more for each point that the archive may contain. Not among these are the solves for the ends of the front, and
         points between them, with which a search begins if it chooses its inner level, or if none of its first candidates is feasible.
-    breeding : float, optional
-        Number of offspring of each point of the archive in an iteration, in [0, 10]; if positive, at least as many offspring as agents.
-        More offspring escape from more local fronts, and leave less of the budget for the agents. Default: 0.15 with up to two
-        objectives, and with three where there are `lone` agents; otherwise 1; and 2 as long as nothing is feasible. If positive,
-        infeasible points with better objectives than the archive's have one child each, where the inner level does not move candidates.
-        0 in the paper.
-    restore : bool, default True
-        Move infeasible points that the archive does not dominate towards feasible ones, by linear models of the constraints, where the
-        inner level does not move candidates and constraints are known one by one. False in the paper.
-    sample : int, optional
-        Number of points of the first population, at least that of the agents. Default: the size of the archive, but at most a twentieth of
-        the budget and at least the number of agents. In the paper: the number of agents.
-    exponent : float, optional
-        Power of the distance in the energy that spreads the archive, in [1, 16]. Default: 2, as in the paper, with two objectives, and 8
-        with three: on a surface, a low power drives the points to the edges. By default a point also takes the place of the nearest one
-        if it adds more to the dominated volume, see `macs.pareto.spread`; with a power given, and with `prefer`, energy alone decides. With
-        more than three objectives the default is no energy: the archive has the best points near evenly spread directions, see
-        `macs.pareto.niches`, unless there is a preference.
     ceiling : int, default 100 000
         Largest number of evaluations of a search without one of its own (`evaluations=None`), which otherwise ends when it is done.
+    variant : Variant or {"default", "paper"}, default "default"
+        How agents move and what the archive keeps, see `MACS.paper`.
 
     Raises
     ------
     ValueError
-        If a setting is outside its range; the message names it.
+        If a setting is outside its range, or one of a former version; the message names it.
 
     Examples
     --------
@@ -189,48 +180,23 @@ class Settings:
     polish_on: str | None = None
     mesh: str = "mended"
     mesh_tolerance: float = 1e-7
-    rho: float = 1.0
-    F: float = 0.9
-    CR: float = 0.9
-    social: float = 1.0
-    contraction: float = 0.5
-    max_contractions: int = 5
-    coordinates: float = 1.0
-    adaptive_coordinates: bool = True
-    lone: int | None = None
-    directions: int | None = None
-    redraw: bool = True
-    reseed: str = "all"
-    momentum: float = 0.7
-    concentration: float = 1.5
-    experience: float = 0.3
-    memory: int = 100
-    shorten: bool = False
-    social_moves: bool = True
-    keep_velocity: bool = True
-    refine_every: int = 200
-    polish_every: int = 20
-    breeding: float | None = None
-    restore: bool = True
-    sample: int | None = None
-    exponent: float | None = None
-    ceiling: int = 100_000
     prefer: Preference | None = None
+    polish_every: int = 20
+    ceiling: int = 100_000
+    variant: Variant = Variant()
 
     def __post_init__(self) -> None:
-        for name, least in LEAST.items():
+        for name, least in LEAST_COUNTS.items():
             check_count(f"MACS: {name}", getattr(self, name), least)
-        for name, least in (("directions", 1), ("lone", 0), ("sample", self.agents)):
-            if getattr(self, name) is not None:
-                check_count(f"MACS: {name}", getattr(self, name), least)
-        for name in ("refine", "adaptive_coordinates", "redraw", "shorten", "social_moves", "keep_velocity", "restore"):
-            if not isinstance(getattr(self, name), bool | np.bool_):
-                raise ValueError(f"MACS: {name} must be True or False, not {getattr(self, name)!r}")
-        for name, interval in INTERVALS.items():
-            if name not in OPTIONAL or getattr(self, name) is not None:
-                check_interval(f"MACS: {name}", getattr(self, name), interval)
-        check_choice("MACS: reseed", self.reseed, ("all", "spread"))
-        check_choice("MACS: mesh", self.mesh, MESHES)
+        if not isinstance(self.refine, bool | np.bool_):
+            raise ValueError(f"MACS: refine must be True or False, not {self.refine!r}")
+        check_choice("MACS: mesh", self.mesh, MESH_WORDS)
+        check_interval("MACS: mesh_tolerance", self.mesh_tolerance, "[1e-10, 1]")
+        if isinstance(self.variant, str):
+            check_choice("MACS: variant", self.variant, tuple(VARIANTS))
+            object.__setattr__(self, "variant", VARIANTS[self.variant])
+        if not isinstance(self.variant, Variant):
+            raise ValueError(f"MACS: variant must be 'default', 'paper' or a Variant, not {self.variant!r}")
         self._check_polish()
         self._read_preference()
 
@@ -261,7 +227,7 @@ class Settings:
     def paper(cls, **overrides: Any) -> Self:
         """The settings of the paper: Table I, and its choices where the defaults differ. `overrides` are settings of MACS.
 
-        There are as many directions as social agents, and these keep theirs; the first population has as many points as there are agents.
+        There are as many directions as agents, and these keep theirs; the first population has as many points as there are agents.
         The following deliberately differs from the paper:
 
         - Feasible points come before infeasible ones, which are ordered by their violation. No penalty enters an objective.
@@ -274,60 +240,53 @@ class Settings:
         - The parents in differential evolution differ from the agent; in social actions also from its copies in the archive.
         - Inertia shortens its step, not the velocity. In differential evolution at least one coordinate changes.
         """
-        settings: dict[str, Any] = {
-            "refine": False,
-            "mesh": "fixed",
-            "adaptive_coordinates": False,
-            "redraw": False,
-            "reseed": "spread",
-            "momentum": 0.0,
-            "concentration": 1.0,
-            "experience": 0.0,
-            "shorten": True,
-            "social_moves": False,
-            "keep_velocity": False,
-            "breeding": 0.0,
-            "restore": False,
-            "lone": 0,
-            "exponent": 2.0,
-        }
-        paper = cls(**(settings | overrides))
-        counts: dict[str, Any] = {"directions": max(1, round(paper.social * paper.agents)), "sample": paper.agents}
-        return replace(paper, **{name: count for name, count in counts.items() if name not in overrides})
+        paper: dict[str, Any] = {"refine": False, "mesh": "fixed", "variant": PAPER}
+        return cls(**(paper | overrides))
+
+    def as_data(self) -> dict[str, Any]:
+        """The settings as plain data, without the preference; the variant by its name, if it has one."""
+        data: dict[str, Any] = asdict(replace(self, prefer=None))
+        del data["prefer"]
+        name = next((name for name, one in VARIANTS.items() if one == self.variant), None)
+        return data | {"variant": name or data["variant"]}
 
     @property
     def refines(self) -> bool:
         """Whether the search makes gradient solves on its own transcription."""
         return self.refine and self.polish_on is None
 
-    def lone_agents(self, m: int, budget: int) -> int:
+    def undirected_agents(self, m: int, budget: int) -> int:
         """Number of agents without a direction beside `agents`, for m objectives, if the first population has points enough."""
-        if self.lone is not None:
-            return self.lone
-        if m > MANY:
+        if not self.variant.undirected or m > MANY:
             return 0
-        return min(max(self.archive - FEW_POINTS, 0) // 2, max(budget - LONG, 0) // (ALONE if m <= CURVE else ALONE_SURFACE))
+        each = UNDIRECTED.each if m <= CURVE else UNDIRECTED.each_surface
+        return min(max(self.archive - UNDIRECTED.few_points, 0) // 2, max(budget - UNDIRECTED.long, 0) // each)
 
     def coordinates_to_scan(self, d: int, archived: int, m: int, budget: int) -> int:
-        """Number of the d coordinates that pattern search tries; with m = 1 objective the archive is full with one point."""
-        if not self.adaptive_coordinates:
-            return max(1, ceil(d * self.coordinates - 1e-9))
+        """Number of the d coordinates that pattern search tries: all while the archive is empty, one when it is full, and in an iteration
+        at most for an eighth of the budget. With m = 1 objective the archive is full with one point."""
+        if not self.variant.adaptive_coordinates:
+            return d
         limit = self.archive if m > 1 else 1
         wanted = ceil(d * (1.0 - (1.0 - 1.0 / d) * archived / limit) - 1e-9)
-        return max(1, min(wanted, budget // (2 * SHARE * self.agents)))
+        return max(1, min(wanted, budget // (2 * 8 * self.agents)))  # two sides
 
     def points_to_sample(self, budget: int) -> int:
         """Number of points of the first population."""
-        return max(self.agents, min(self.archive, budget // 20)) if self.sample is None else self.sample
+        return self.agents if self.variant == PAPER else max(self.agents, min(self.archive, budget // 20))
 
-    def offspring(self, parents: int, m: int, lone: int = 0, feasible: bool = True) -> int:
-        """Number of offspring of so many parents in an iteration, with m objectives, in which so many lone agents act; 0 without
-        parents."""
-        each = SOME if m <= CURVE or (m <= MANY and lone > 0) else GENERATION
-        each = (each if feasible else GENERATIONS) if self.breeding is None else self.breeding
-        return max(self.agents + lone, round(each * parents)) if each and parents else 0
+    def offspring(self, parents: int, m: int, undirected: int = 0, feasible: bool = True) -> int:
+        """Number of offspring of so many parents in an iteration, with m objectives, in which so many agents without a direction act: at
+        least one for each agent; 0 without parents."""
+        if not (self.variant.breeding and parents):
+            return 0
+        each = OFFSPRING.curve if m <= CURVE or (m <= MANY and undirected > 0) else OFFSPRING.surface
+        return max(self.agents + undirected, round((each if feasible else OFFSPRING.infeasible) * parents))
+
+    def directions_to_draw_from(self, m: int) -> int:
+        """Size of the pool of directions."""
+        return 100 * m if self.variant.redraw else self.agents
 
     def social_agents(self, m: int) -> int:
         """Number of agents with a direction, for m objectives: 0 if they are too few for all orthogonal directions."""
-        count = round(self.social * self.agents)
-        return count if count >= m else 0
+        return self.agents if self.agents >= m else 0

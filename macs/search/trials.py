@@ -1,34 +1,126 @@
-"""Evaluation of the agents' proposals: a proposal is evaluated, and its agent moves there if it is better."""
+"""Evaluation of proposals: which inner solver each goes to, and whether its agent moves there.
+
+What a way of making candidates feasible is worth differs from problem to problem, and during a search: where the ends of trajectories are
+free, propagation finds a front in no time; where they are fixed, nothing that is only propagated is feasible. So most proposals go to the
+inner solver that has brought most for its work, and a little to the others. Gradient solves compete, too: where these bring most, proposals
+are only propagated, since they are what the solves begin from. Work is counted, not timed.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..evaluation.evaluator import Evaluation, Evaluator
 from ..pareto.directions import tchebycheff
 from ..pareto.dominance import constrained_dominates
-from .effort import Gains, evaluated
-from .rounds import PLANNED
+from .rounds import PLANNED_EVALUATIONS
 from .settings import Settings
-from .state import NO_DIRECTION, SearchState
+from .state import NO_DIRECTION, Credit, SearchState
 
-CREDIT = 0.5
+STEP_KEPT = 0.5
 """Least fraction of a proposed step that the inner level must leave, for the success to expand the radius."""
+WORK, EVALUATIONS, FEASIBLE = range(3)
+"""Columns of `SearchState.spent`."""
+
+
+@dataclass(frozen=True)
+class InnerShares:
+    """What goes to the inner solvers that do not bring most (measured on the catalogue's problems)."""
+
+    cheaper: float = 0.1  # least share of all evaluations of one that takes less work than that which brings most
+    dearer: float = 0.15  # share of all work, with the gradient solves to come, of those that take more
+    least: float = 0.03  # least share of each of these
+    compiling: int = 300  # iterations that take as long as to build the functions of one: it is tried when its share is worth as much
+    solve: int = 50  # iterations of a gradient solve, about: they are measured once one was made
+
+
+INNER_SHARES = InnerShares()
+
+
+def initial_credit(evaluator: Evaluator, variables: int, gradients: bool) -> tuple[Credit, np.ndarray]:
+    """Credit and spending of the inner solvers and of gradient solves, which are believed to bring a whole front each until they were
+    tried. Without gradients there is nothing to choose: what is only propagated would never be made feasible."""
+    rows = len(evaluator.ways) + 1 if gradients and evaluator.ways else 0
+    credit = Credit(np.zeros(rows), np.zeros(rows))
+    credit.gained[-1:], credit.cost[-1:] = 1.0, INNER_SHARES.solve * variables
+    return credit, np.zeros((rows, 3))
+
+
+def choose_inner_solvers(credit: Credit, spent: np.ndarray, count: int, every: int | None, compiling: float = 0.0) -> np.ndarray:
+    """The inner solver (count,) that each of the next proposals goes to: that which brings most for its work, or the first where gradient
+    solves do, one of which is made for `every` evaluations in the end; or those that have not had their shares."""
+    rate, ways = credit.rates(), spent[:-1]
+    main = int(np.argmax(rate)) % len(ways)
+    evaluations = ways[:, EVALUATIONS].sum()
+    for way in range(main):
+        if ways[way, EVALUATIONS] <= INNER_SHARES.cheaper * evaluations:
+            return np.full(count, way)
+    solving, solves = spent[-1, [WORK, EVALUATIONS]]
+    each_solve = solving / solves if solves else credit.cost[-1]
+    ahead = 0.0 if every is None else max(0.0, evaluations / every - solves) * each_solve
+    chosen, free = np.full(count, main), count
+    dearer = np.arange(main + 1, len(ways))
+    shares = np.full(len(dearer), INNER_SHARES.least)
+    if len(dearer):
+        shares[np.argmax(rate[dearer])] = INNER_SHARES.dearer - INNER_SHARES.least * (len(dearer) - 1)
+    for way, share in zip(dearer.tolist(), shares.tolist(), strict=True):
+        left = share * (spent[:, WORK].sum() + ahead) - ways[way, WORK]
+        each = ways[way, WORK] / max(ways[way, EVALUATIONS], 1.0)
+        some = min(free, max(int(left / each), 0) if each else int(left >= compiling))
+        chosen[free - some : free] = way
+        free -= some
+    return chosen
+
+
+def give_credit(state: SearchState, way: int, gained: float, work: int, count: int, feasible: int = 0) -> None:
+    """Credit an inner solver, or gradient solves (-1), for what `count` evaluations or solves brought."""
+    if len(state.spent):
+        one = np.zeros(len(state.spent))
+        one[way] = 1.0
+        state.inner.add(gained * one, work * one)
+        state.spent[way] += work, count, feasible
+
+
+class Gains:
+    """What points bring to a front: by how much they improve the best values of its directions, on average, each of which counts one from
+    the ideal point to the nadir. As long as there is no front, none counts."""
+
+    def __init__(self, state: SearchState, tolerance: float) -> None:
+        self._directions, self._tolerance = state.directions, tolerance
+        self._ideal, self._nadir = state.ideal, state.nadir
+        self._front = state.archive.F
+        self._best: np.ndarray | None = None  # best values, computed when they are needed
+
+    def of(self, seen: Evaluation) -> float:
+        """What these points bring, which then count as known."""
+        F = seen.F[seen.violation <= self._tolerance]
+        if not len(self._front) or not len(F):
+            return 0.0
+        if self._best is None:
+            self._best = self._values(self._front)
+        values = np.minimum(self._values(F), self._best)
+        brought = float(np.mean(np.minimum(self._best - values, 1.0)))
+        self._best = values
+        return brought
+
+    def _values(self, F: np.ndarray) -> np.ndarray:
+        return tchebycheff(F[:, None], self._directions, self._ideal, self._nadir).min(axis=0)
 
 
 class Trials:
-    """Evaluates proposals within the budget, during one phase of an iteration, and records all results. credited (n,), gained (n,), tried
-    (n,)."""
+    """Evaluates proposals within the budget, during one phase of an iteration, and records all results."""
 
     def __init__(self, settings: Settings, state: SearchState, evaluator: Evaluator, budget: int) -> None:
         self.settings, self.state, self.evaluator, self.budget = settings, state, evaluator, budget
         self.box = evaluator.box
-        self.planned = budget if state.rounds is None else PLANNED
+        self.planned = budget if state.rounds is None else PLANNED_EVALUATIONS
         self.seen: list[Evaluation] = []
         self._gains = Gains(state, evaluator.tolerance)
-        self._every = settings.polish_every if settings.refines and evaluator.has_gradients else None
-        self.credited = np.zeros(len(state.agents), dtype=bool)
-        self.gained, self.tried = np.zeros(len(state.agents)), np.zeros(len(state.agents), dtype=int)
+        n = len(state.agents)
+        self.successful = np.zeros(n, dtype=bool)  # (n,): agents with a success that kept most of the step
+        self.gained, self.tried = np.zeros(n), np.zeros(n, dtype=int)  # (n,): improvements of agents, and their evaluations
 
     def positions(self, rows: np.ndarray | None = None) -> np.ndarray:
         """Unit coordinates (k, d) of the agents `rows`, or of all agents."""
@@ -36,24 +128,45 @@ class Trials:
         return self.box.to_unit(Z[:, self.evaluator.free])
 
     def evaluate(self, Z: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
-        """Evaluate the proposals `trial` (k, d), made from full vectors Z (k, D) with unit coordinates X (k, d); no agent moves. Returns
-        (j,)."""
+        """Evaluate proposals (k, d), made from full vectors Z (k, D) with unit coordinates X (k, d), as far as they differ and the budget
+        goes; no agent moves. Returns their rows (j,), and the results."""
         moved = np.flatnonzero((trial != X).any(axis=1))[: max(self.budget - self.state.evaluations, 0)]
         if not moved.size:
             return moved, None
         X, trial, free = X[moved], trial[moved], self.evaluator.free
         Z = Z[moved]
         Z[:, free] = np.where(trial != X, self.box.to_values(trial), Z[:, free])
-        result = evaluated(self.state, self.evaluator, Z, self._gains, self._every)
+        result = self._evaluated(Z)
         self.state.evaluations = self.evaluator.counts.evaluations
         self.seen.append(result)
         return moved, result
 
-    def evaluate_and_accept(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, velocity: bool = True) -> np.ndarray:
-        """Evaluate the proposals `trial` (k, d) of the agents `rows` at X (k, d), and move the agents with success.
+    def _evaluated(self, Z: np.ndarray) -> Evaluation:
+        """The evaluation of full vectors (k, D), each by the inner solver that is worth most now. As long as nothing is feasible, and
+        without gradients, all go to the evaluator's own."""
+        state, counts = self.state, self.evaluator.counts
+        if not len(state.spent) or not len(state.archive):
+            return self.evaluator.evaluate(Z)
+        every = self.settings.polish_every if self.settings.refines else None
+        chosen = choose_inner_solvers(state.inner, state.spent, len(Z), every, INNER_SHARES.compiling * Z.shape[1])
+        parts = []
+        for way in np.unique(chosen).tolist():
+            before = counts.work
+            parts.append(self.evaluator.evaluate(Z[chosen == way], way))
+            feasible = int(np.count_nonzero(parts[-1].violation <= self.evaluator.tolerance))
+            give_credit(state, way, self._gains.of(parts[-1]), counts.work - before, len(parts[-1].F), feasible)
+        if len(parts) == 1:
+            return parts[0]
+        whole = parts[0]
+        for part in parts[1:]:
+            whole = whole.joined(part)
+        return whole.take(np.argsort(np.argsort(chosen, kind="stable"), kind="stable"))
 
-        A success is dominance over the agent, or a better value for its direction. Velocities and experience use the displacements after
-        the inner level, not the proposed ones. Without `velocity`, an agent with success is left at rest. Returns (k,).
+    def evaluate_and_accept(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, velocity: bool = True) -> np.ndarray:
+        """Evaluate the proposals (k, d) of the agents `rows` at X (k, d), move the agents with success, and return the mask (k,) of these.
+
+        A success is dominance over the agent, or a better value for its direction. Velocities use the displacements after the inner level,
+        not the proposed ones. Without `velocity`, an agent with success is left at rest.
         """
         success = np.zeros(len(rows), dtype=bool)
         moved, result = self.evaluate(self.state.agents.Z[rows], X, trial)
@@ -67,11 +180,9 @@ class Trials:
         self.gained[rows[improved]] += self._improvement(rows[improved], result.take(np.flatnonzero(improved)))
         proposed = self.box.difference(trial, X)
         achieved = self.box.difference(self.box.to_unit(result.Z[:, free]), X)
-        self.credited[rows] |= better & ((proposed * achieved).sum(axis=1) >= CREDIT * (proposed**2).sum(axis=1))
-        last = self.settings.momentum * agents.velocity[rows[better]]
-        agents.velocity[rows[better]] = achieved[better] + last if velocity else 0.0
+        self.successful[rows] |= better & ((proposed * achieved).sum(axis=1) >= STEP_KEPT * (proposed**2).sum(axis=1))
+        agents.velocity[rows[better]] = achieved[better] if velocity else 0.0
         agents.place(rows[better], result.Z[better], result.F[better], result.violation[better])
-        self.state.experience = np.vstack([self.state.experience, achieved[improved]])[-self.settings.memory :]
         success[moved] = better
         return success
 

@@ -1,22 +1,19 @@
 """Keeps a run in a file, so that the same call continues it, whatever ended it.
 
-The first line of a file is `MACS checkpoint 6: N bytes, sha256 H`; N and H are those of the npz archive that follows, of arrays and a JSON
-document. So a file that was damaged is refused before any of it is unpacked. Of a forged one, no array is allocated before its size is
-known to be that of its bytes. Nothing is pickled. The document says which run it is, by which versions it was computed, and how it stands,
-in the trees of `packing`.
+The first line of a file is `MACS checkpoint 7: N bytes, sha256 H`; N and H are those of the MessagePack document that follows. So a file
+that was damaged is refused before any of it is read. Of a forged one, no array takes more memory than the file has bytes. Nothing is
+pickled. The document says which run it is, by which versions it was computed, and how it stands; see `packing`.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import logging
 import math
 import re
 import stat
 import time
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, is_dataclass
@@ -32,9 +29,14 @@ from ..fronts.provenance import versions
 from ..io.atomic import write_whole
 from ..io.text import document
 from .method import SearchMethod
-from .packing import pack, unpack
-from .shapes import check_shapes
+from .packing import check_kept, check_shapes, decode, encode
 
+VERSION = 7
+"""Of the file format: of the document, and of the states in it."""
+FIRST_LINE = re.compile(rb"MACS checkpoint (\d{1,9}): (\d{1,18}) bytes, sha256 ([0-9a-f]{64})\n")
+LONGEST_LINE = 200
+LARGEST = 2**32
+"""Bytes that the document of a file may have."""
 SECONDS, SHARE = 1.0, 20.0
 """The time between two writes is at least so many seconds, and at least so many times what the last write took."""
 INSTEAD = "it was left as it is; make the call that it belongs to, name another file, or delete this one"
@@ -42,16 +44,14 @@ HINTS = {
     "problem": "bounds, equations, objectives or data differ, or another CasADi",
     "evaluations": "a larger budget is another search; to add to what was found, give its front as start",
 }
-PARTS = ("belongs", "versions", "run", "state")
-"""Parts of the document."""
-RANKS = {"F": 2, "Z": 2, "violation": 1}
-"""Numbers of dimensions of the rows that each state has."""
+POINTS = {"Z": "n D", "F": "n m", "violation": "n"}
+"""Shapes of the points that each state has."""
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Kept:
+class RunStatus:
     """How a run stands between two iterations, beside the state of its solver."""
 
     seed: int
@@ -59,6 +59,19 @@ class Kept:
     idle: int  # number of iterations since the last evaluation
     elapsed: float  # seconds of work so far
     stopped: str = ""  # why the run ended by itself; empty as long as it has not
+
+
+@dataclass(frozen=True)
+class _Document:
+    """What a file has after its first line."""
+
+    belongs: str  # JSON: all that determines the run, with its seed
+    versions: list[dict[str, str]]
+    counts: Counts
+    idle: int
+    elapsed: float
+    stopped: str
+    state: bytes
 
 
 class Unreadable(ValueError):  # noqa: N818 - the state of the file
@@ -80,15 +93,16 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         self._belongs = _read_json(document(dict(belongs)))
         self._versions = [versions()]
         self._sizes = sizes or {}
-        self._waiting: tuple[dict[str, Any], dict[str, np.ndarray]] | None = None
+        self._waiting: _Document | None = None
+        self._checked = False  # whether the state is one that comes back as it was
         self._written, self._took = time.perf_counter(), 0.0
 
     @property
     def mixed(self) -> bool:
-        """See the class."""
+        """Whether the run was computed by several versions."""
         return len(self._versions) > 1
 
-    def read(self, seed: int | None) -> tuple[Any, Kept] | None:
+    def read(self, seed: int | None) -> tuple[Any, RunStatus] | None:
         """The solver's state, and how the run of this seed (None: of any seed) stands; None if there is no file."""
         try:
             return self._read(seed)
@@ -99,42 +113,48 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         except ValueError as error:
             raise Unreadable(f"'{self.path}' {' '.join(str(error).split())}; {INSTEAD}") from error
 
-    def _read(self, seed: int | None) -> tuple[Any, Kept]:
+    def _read(self, seed: int | None) -> tuple[Any, RunStatus]:
         """As `read`; the message of a ValueError continues after the name of the file."""
-        header, arrays = read_file(self.path)
-        if not isinstance(header, dict) or header.keys() != {*PARTS} or not isinstance(header["belongs"], dict):
-            raise ValueError(f"is no valid checkpoint: its document does not consist of {', '.join(PARTS)}")
+        content = read_file(self.path)
         try:
-            kept = unpack(header["run"], Kept, arrays, "run")
-            _check_counts(kept)
-            mine = self._belongs | {"seed": kept.seed if seed is None else seed}
-            differences = [*_differences(header["belongs"] | {"seed": kept.seed}, mine)]
-            if differences:
-                raise ValueError(f"belongs to another run: {'; '.join(differences)}")
-            state = unpack(header["state"], self._state_class, arrays, "state")
-            _check_points(state)
-            self._check_shapes(state)
-            known = unpack(header["versions"], list[dict[str, str]], arrays, "versions")
-            if arrays:
-                raise TypeError(f"{min(arrays)} is unknown")
+            found = decode(content, _Document)
+            theirs = _read_json(found.belongs)
+            status = RunStatus(theirs.get("seed"), found.counts, found.idle, found.elapsed, found.stopped)
+            _check_counts(status)
+        except (TypeError, AttributeError, ValueError, RecursionError) as error:
+            raise ValueError(f"is no valid checkpoint: {error}") from error
+        mine = self._belongs | {"seed": status.seed if seed is None else seed}
+        if differences := [*_differences(theirs, mine)]:
+            raise ValueError(f"belongs to another run: {'; '.join(differences)}")
+        try:
+            state = decode(found.state, self._state_class)
+            self._check(state)
         except TypeError as error:
             raise ValueError(f"cannot be continued by this {self._solver}: {error}") from error
-        self._versions = [*(one for one in known if one != versions()), versions()]
+        self._versions = [*(one for one in found.versions if one != versions()), versions()]
         if self.mixed:
             log.warning("checkpoint '%s' was written by other versions: the rest of the run may differ in its last bits", self.path)
-        return state, kept
+        return state, status
 
-    def keep(self, state: Any, kept: Kept) -> None:
+    def keep(self, state: Any, status: RunStatus) -> None:
         """Note how the run stands, for the next write. Raises TypeError for a state that is not as the contract of a solver has it."""
-        arrays: dict[str, np.ndarray] = {}
-        trees = {"run": pack(kept, Kept, arrays, "run"), "state": pack(state, self._state_class, arrays, "state")}
-        _check_points(state)
-        self._check_shapes(state)
-        self._waiting = trees, arrays
+        content = encode(state)
+        if not self._checked:
+            check_kept(state, content, self._state_class)
+            self._checked = True
+        self._check(state)
+        belongs = json.dumps(self._belongs | {"seed": status.seed})
+        self._waiting = _Document(belongs, self._versions, status.counts, status.idle, status.elapsed, status.stopped, content)
+        self._waiting = decode(encode(self._waiting), _Document)  # a copy: the counts go on
 
-    def _check_shapes(self, state: Any) -> None:
-        """See `check_shapes`; the objectives of a function that was not evaluated yet are those of the archive."""
-        check_shapes(state, {"m": state.archive.F.shape[1], **self._sizes})
+    def _check(self, state: Any) -> None:
+        """Raise TypeError for shapes that no state has; the objectives of a function that was not evaluated yet are the archive's."""
+        sizes = {"m": state.archive.F.shape[-1], **self._sizes}
+        for name in ("archive", "closest"):
+            check_shapes(getattr(state, name), sizes, f"state.{name}", POINTS)
+        if not all(np.isfinite(getattr(state.archive, name)).all() for name in POINTS):
+            raise TypeError("state.archive has a value that is not finite")
+        check_shapes(state, sizes)
 
     def write_in_time(self) -> None:
         """Write what is not in the file yet, if the last write is long enough ago."""
@@ -148,11 +168,9 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         """Write what is not in the file yet."""
         if self._waiting is None:
             return
-        trees, arrays = self._waiting
         began = time.perf_counter()
         try:
-            header = {"belongs": self._belongs, "versions": self._versions, **trees}
-            write_whole(self.path, to_bytes(header, arrays))
+            write_whole(self.path, sealed(encode(self._waiting)))
         except OSError as error:
             if not self.failure:
                 log.warning("checkpoint: %s; the search goes on without", error.strerror or error)
@@ -183,29 +201,13 @@ def _state_class(solver: SearchMethod) -> type:
     return found
 
 
-def _check_counts(kept: Kept) -> None:
-    """Raise TypeError for a number that no run can have."""
-    counts = {f"counts.{name}": count for name, count in vars(kept.counts).items() if name != "failures"}
-    failures = {f"counts.failures[{status!r}]": count for status, count in kept.counts.failures.items()}
-    for name, number in {"seed": kept.seed, "idle": kept.idle, "elapsed": kept.elapsed, **counts, **failures}.items():
-        if not 0 <= number < math.inf:
-            raise TypeError(f"run.{name} is {number}, a number of at least 0 expected")
-
-
-def _check_points(state: Any) -> None:
-    """Raise TypeError unless the points of a state are what the contract of a solver says: rows of floats, those of the archive finite."""
-    columns: dict[str, int] = {}
-    for name in ("archive", "closest"):
-        for part, rank in RANKS.items():
-            where, array = f"state.{name}.{part}", getattr(getattr(state, name), part)
-            if array.dtype != float or array.ndim != rank:
-                raise TypeError(f"{where} is an array of {array.dtype} with {array.ndim} dimensions; float64 with {rank} expected")
-            if len(array) != (rows := len(getattr(state, name).F)):
-                raise TypeError(f"{where} has {len(array)} rows, {rows} expected")
-            if rank == 2 and array.shape[1] != columns.setdefault(part, array.shape[1]):
-                raise TypeError(f"{where} has {array.shape[1]} columns, {columns[part]} expected")
-            if name == "archive" and not np.isfinite(array).all():
-                raise TypeError(f"{where} has a value that is not finite")
+def _check_counts(status: RunStatus) -> None:
+    """Raise ValueError for a number that no run can have."""
+    numbers = {f"counts.{name}": count for name, count in vars(status.counts).items() if name != "failures"}
+    failures = {f"counts.failures[{name!r}]": count for name, count in status.counts.failures.items()}
+    for name, number in {"seed": status.seed, "idle": status.idle, "elapsed": status.elapsed, **numbers, **failures}.items():
+        if isinstance(number, bool) or not isinstance(number, int | float) or not 0 <= number < math.inf:
+            raise ValueError(f"{name} is {number!r}, a number of at least 0 expected")
 
 
 def _read_json(text: str) -> Any:
@@ -229,26 +231,13 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-VERSION = 6
-FIRST_LINE = re.compile(rb"MACS checkpoint (\d{1,9}): (\d{1,18}) bytes, sha256 ([0-9a-f]{64})\n")
-LONGEST_LINE = 200
-LARGEST = 2**32
-"""Bytes that the archive of a file may have."""
-DOCUMENT = "document"
-"""The member of the archive that is JSON, as an array of bytes."""
+def sealed(content: bytes, version: int = VERSION) -> bytes:
+    """The content of a file: after a first line with its length and checksum."""
+    return f"MACS checkpoint {version}: {len(content)} bytes, sha256 {hashlib.sha256(content).hexdigest()}\n".encode() + content
 
 
-def to_bytes(document: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> bytes:
-    """The content of a file with a document (what JSON knows, infinities and NaN included) and named arrays, none of objects."""
-    buffer = io.BytesIO()
-    members: dict[str, Any] = {DOCUMENT: np.frombuffer(json.dumps(document).encode(), dtype=np.uint8), **arrays}
-    np.savez(buffer, **members)
-    archive = buffer.getvalue()
-    return f"MACS checkpoint {VERSION}: {len(archive)} bytes, sha256 {hashlib.sha256(archive).hexdigest()}\n".encode() + archive
-
-
-def read_file(path: str | PathLike[str]) -> tuple[Any, dict[str, np.ndarray]]:
-    """The document and the arrays of a file, checked against its checksum."""
+def read_file(path: str | PathLike[str]) -> bytes:
+    """What follows the first line of a file, checked against its checksum."""
     if not stat.S_ISREG(Path(path).stat().st_mode):
         raise ValueError("is no ordinary file")  # reading a device or a pipe may never end
     with Path(path).open("rb") as file:
@@ -266,44 +255,7 @@ def read_file(path: str | PathLike[str]) -> tuple[Any, dict[str, np.ndarray]]:
             raise ValueError(f"is damaged: it should have {size} bytes after its first line, but has {found}")
         if size > LARGEST:
             raise ValueError(f"is no valid checkpoint: it has {size} bytes, more than {LARGEST}")
-        archive = file.read(size)
-    if hashlib.sha256(archive).hexdigest() != checksum:
+        content = file.read(size)
+    if hashlib.sha256(content).hexdigest() != checksum:
         raise ValueError("is damaged: its content does not match its checksum")
-    return _from_archive(archive)
-
-
-def _from_archive(archive: bytes) -> tuple[Any, dict[str, np.ndarray]]:
-    arrays = {name.removesuffix(".npy"): _array(name, content) for name, content in _members(archive).items()}
-    if DOCUMENT not in arrays:
-        raise ValueError("is no valid checkpoint: it has no document")
-    try:
-        return json.loads(arrays.pop(DOCUMENT).tobytes()), arrays
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"is no valid checkpoint: its document is no JSON ({error})") from error
-
-
-def _members(archive: bytes) -> dict[str, bytes]:
-    """The members of a zip archive, which have to be stored as they are: then none is larger than the archive."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(archive)) as file:
-            infos = file.infolist()
-            stored = all(info.compress_type == zipfile.ZIP_STORED for info in infos)
-            if not stored or sum(info.file_size for info in infos) > len(archive):
-                raise ValueError("its members are compressed, or overlap")
-            return {info.filename: file.read(info) for info in infos}
-    except Exception as error:  # zipfile raises errors of many classes; whichever it is, the archive is not one that `to_bytes` wrote
-        raise ValueError(f"is no valid checkpoint: its archive cannot be read ({error})") from error
-
-
-def _array(name: str, content: bytes) -> np.ndarray:
-    """An array of the content of an npy file. Only the header is parsed by numpy, which would allocate what the header asks for."""
-    stream = io.BytesIO(content)
-    try:
-        np.lib.format.read_magic(stream)
-        shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
-        start = stream.tell()
-        if dtype.hasobject or not dtype.itemsize or math.prod(shape) * dtype.itemsize != len(content) - start:
-            raise ValueError(f"its {len(content) - start} bytes are no array {shape} of {dtype}")
-        return np.ndarray(shape, dtype, content, start, order="F" if fortran else "C").copy(order="K")
-    except Exception as error:  # as above: the parser of numpy raises errors of many classes
-        raise ValueError(f"is no valid checkpoint: {name.removesuffix('.npy')} is no array ({error})") from error
+    return content

@@ -45,36 +45,29 @@ class SearchMethod(ABC):
             cls.__repr__ = short_repr  # type: ignore[method-assign]
 
     @abstractmethod
-    def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
-        """The state after a first population has been evaluated, the full vectors `start` (k, D) first."""
+    def begin(self, evaluator: Evaluator, budget: Any, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
+        """The state after a first population has been evaluated, the full vectors `start` (k, D) first; `budget` is the number of
+        evaluations, None for a search until it is done."""
 
     @abstractmethod
     def advance(self, state: Any, evaluator: Evaluator, budget: int) -> None:
         """Do one iteration within the budget of evaluations; changes `state`."""
 
-    def has_settled(self, state: Any) -> bool:
-        """Whether the search is to end before its budget is spent, by the state alone; most solvers go on."""
-        return False
-
     @property
     def searches_until_done(self) -> bool:
         """Whether a search needs no number of evaluations: it goes on in rounds, and ends when more work no longer changes the front.
 
-        For that: `begin_rounds` instead of `begin`; `round_end`, up to which `advance` is called; `conclude` at the end of each round,
-        which begins the next one in the state, unless `ended` then says why there is none.
+        For that: `begin` with the budget None; `round_end`, up to which `advance` is called; `conclude` at the end of each round, which
+        begins the next one in the state, unless `ended` then says why there is none.
         """
         return False
-
-    def begin_rounds(self, evaluator: Evaluator, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
-        """As `begin`, of a search without a number of evaluations."""
-        raise NotImplementedError(f"{type(self).__name__} needs a number of evaluations")
 
     def round_end(self, state: Any) -> int:
         """Number of evaluations at which the current round ends."""
         raise NotImplementedError(f"{type(self).__name__} needs a number of evaluations")
 
     def ended(self, state: Any) -> str:
-        """Why a search in rounds is at its end, a word of `run.ENDED`; empty as long as it goes on."""
+        """Why a search is at its end, by the state alone, a word of `run.ENDED`; empty as long as it goes on."""
         return ""
 
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
@@ -112,14 +105,9 @@ class SearchMethod(ABC):
         """Raise ValueError if the solver or its settings need dynamics or derivatives. Called before any work."""
 
     @property
-    def mends(self) -> bool:
-        """Whether `finish` solves points again that a simulation does not confirm."""
-        return False
-
-    @property
     def remeshes(self) -> bool:
         """Whether `finish` solves points on finer meshes, so that a search may go on a coarse one."""
-        return self.mends
+        return False
 
     def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: Chosen | None = None) -> Front:
         """The front, marked by a simulation of its points unless `verify` is None, after further work.

@@ -19,7 +19,7 @@ from ..evaluation.evaluator import Counts, Evaluator
 from ..front import Front
 from ..fronts.provenance import costs
 from ..io.interrupts import Interrupts
-from .checkpoint import Checkpoint, Kept
+from .checkpoint import Checkpoint, RunStatus
 from .method import SearchMethod
 from .progress import Progress, SearchDisplay
 
@@ -55,21 +55,21 @@ class SearchRun:
         """The front of the search, new or continued from its checkpoint, until the budget is spent or the search is stopped."""
         self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs(), self.evaluator.sizes)
         found = self._checkpoint.read(self.seed) if self._checkpoint else None
-        kept = found[1] if found else Kept(secrets.randbits(63) if self.seed is None else int(self.seed), Counts(), 0, 0.0)
+        status = found[1] if found else RunStatus(secrets.randbits(63) if self.seed is None else int(self.seed), Counts(), 0, 0.0)
         self._state: Any = found[0] if found else None
-        self.seed, self._idle = kept.seed, kept.idle
+        self.seed, self._idle = status.seed, status.idle
         if self._state is not None:
-            self.evaluator.resume(kept.counts, self._state.archive.F.shape[1])
-        self._uncut = kept.counts.clocked
+            self.evaluator.resume(status.counts, self._state.archive.F.shape[1])
+        self._uncut = status.counts.clocked
         self._callback, self._called_off = callback, ""
         with (
             self._checkpoint or nullcontext(),
             SearchDisplay(progress) as self._display,
-            Interrupts(time_limit, kept.elapsed) as self._interrupts,
+            Interrupts(time_limit, status.elapsed) as self._interrupts,
             stopped_by(self._asked_to_stop),
         ):
-            stopped = kept.stopped or self._search()
-            if not kept.stopped and stopped in ENDED:
+            stopped = status.stopped or self._search()
+            if not status.stopped and stopped in ENDED:
                 self._keep(stopped)
             self._show()
             if self._checkpoint:
@@ -84,7 +84,7 @@ class SearchRun:
         if self._state is None:
             self.evaluator.before_batch = self._show
             try:
-                self._state = self._begun()
+                self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
             except Stopped as reason:  # while something was built that even the first evaluations need
                 return str(reason)
             self._keep()
@@ -107,27 +107,18 @@ class SearchRun:
         except Stopped as reason:
             return str(reason)
 
-    def _begun(self) -> Any:
-        """The state after the first population."""
-        rng = np.random.default_rng(self.seed)
-        if self.budget is None:
-            return self.solver.begin_rounds(self.evaluator, rng, self.start)
-        return self.solver.begin(self.evaluator, self.budget, rng, self.start)
-
     def _ended(self) -> str:
         """Why the run has ended, after its last round; empty if another follows."""
         if self.budget is not None and self.evaluator.counts.evaluations >= self.budget:
             return "budget"
-        if self.solver.has_settled(self._state):
-            return "settled"
-        return (self.budget is None and self.solver.ended(self._state)) or ("idle" if self._idle >= IDLE_ITERATIONS else "")
+        return self.solver.ended(self._state) or ("idle" if self._idle >= IDLE_ITERATIONS else "")
 
     def _search_round(self) -> None:
         """Search up to the budget, or to the end of the current round."""
         self.evaluator.before_batch = self._show_and_check
         counts = self.evaluator.counts
         limit = self.solver.round_end(self._state) if self.budget is None else self.budget
-        while counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not self.solver.has_settled(self._state):
+        while counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not self.solver.ended(self._state):
             spent = counts.evaluations
             self.solver.advance(self._state, self.evaluator, limit)
             self._idle = self._idle + 1 if counts.evaluations == spent else 0
@@ -158,10 +149,10 @@ class SearchRun:
         self._uncut = counts.clocked
         if self._checkpoint:
             assert self.seed is not None
-            self._checkpoint.keep(self._state, Kept(self.seed, counts, self._idle, self._interrupts.elapsed, stopped))
+            self._checkpoint.keep(self._state, RunStatus(self.seed, counts, self._idle, self._interrupts.elapsed, stopped))
 
     def _cut_short(self) -> bool:
-        """Whether a time limit, Ctrl-C or the callback has cut work short since the state was last kept."""
+        """Whether a time limit, Ctrl-C or the callback has cut work short since the state was last status."""
         return bool(self._reason) and self.evaluator.counts.clocked > self._uncut
 
     @property

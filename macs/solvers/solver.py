@@ -412,7 +412,10 @@ def solver(name: str, **settings: Any) -> Solver:
     as_published = getattr(kind, PAPER, None)
     if paper and as_published is None:
         raise ValueError(f"solver '{name}' has no settings of a paper")
+    gone = getattr(kind, "gone", {})
     for key in settings:
+        if key in gone:
+            raise ValueError(f"solver '{name}': {key} is no setting any more: {gone[key]}")
         if key not in known:
             raise ValueError(unknown(f"setting of solver '{name}'", key, known))
     return as_published(**settings) if paper and as_published else kind(**settings)

@@ -15,7 +15,7 @@ import numpy as np
 from macs.evaluation.blackbox import PymooFunction, is_pymoo, plain_problem
 from macs.io.text import call
 from macs.refinement.search_mesh import default_transcription
-from macs.search.rounds import PLANNED
+from macs.search.rounds import PLANNED_EVALUATIONS
 from macs.solvers.solver import Solver, solver
 from macs.solvers.start import drawing
 from problems import Problem, VectorProblem, load
@@ -51,7 +51,7 @@ class Cell:
     @property
     def planned(self) -> int:
         """Its budget, or where there is none about what a search takes."""
-        return PLANNED if self.evaluations is None else self.evaluations
+        return PLANNED_EVALUATIONS if self.evaluations is None else self.evaluations
 
     @property
     def labels(self) -> tuple[str, str, str]:

@@ -161,14 +161,14 @@ def checkpointing(agents: int) -> Work:
     """The checkpoint of so many agents, of 200 variables each, written and read again."""
     solver = MACS(agents=agents, archive=100, refine=False)
 
-    def begin(path: Path) -> tuple[Any, dict[str, np.ndarray]]:
+    def begin(path: Path) -> bytes:
         solver.minimize(two_goals, [(0.0, 1.0)] * 200, evaluations=agents, seed=1, checkpoint=path)
         return checkpoint.read_file(path)
 
-    header, arrays = in_folder(begin)
+    content = in_folder(begin)
 
     def again(path: Path) -> object:
-        path.write_bytes(checkpoint.to_bytes(header, arrays))
+        path.write_bytes(checkpoint.sealed(content))
         return checkpoint.read_file(path)
 
     return lambda: in_folder(again)

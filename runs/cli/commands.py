@@ -19,7 +19,7 @@ from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target
 from macs.io.interrupts import Interrupts
 from macs.io.text import label, text_table
-from macs.search.settings import MESHES
+from macs.search.settings import MESH_WORDS
 from macs.solvers.solver import Solver, solver_class
 from problems.catalogue import is_catalogued
 from problems.checks import unknown
@@ -49,7 +49,7 @@ def solve(arguments: Namespace) -> int:
     problem = load_problem(arguments.problem, **read_data(arguments.data or []))
     with wrong_call_on_value_error():
         scheme = None if arguments.transcription is None else transcription.parse(arguments.transcription)
-    mesh = choose(arguments.mesh, MESHES, "kind of mesh") if arguments.mesh else None
+    mesh = choose(arguments.mesh, MESH_WORDS, "kind of mesh") if arguments.mesh else None
     solver = make_solver(arguments.solver, arguments.no_refine, mesh, arguments.polish_on, arguments.prefer)
     verify = None if arguments.verify == UNSIMULATED else arguments.verify or problem.default_verify
     inner = arguments.inner and choose(arguments.inner, NAMED, "inner level")
@@ -195,8 +195,8 @@ def bench(arguments: Namespace) -> int:
 
 
 def make_solver(name: str, plain: bool = False, mesh: str | None = None, polish_on: str | None = None, prefer: str | None = None) -> Solver:
-    """A solver by its name in lower case, `plain` without derivatives, with one of `MESHES`, polished on another transcription, or guided
-    by the preference in a file."""
+    """A solver by its name in lower case, `plain` without derivatives, with a word for the mesh, polished on another transcription, or
+    guided by the preference in a file."""
     with wrong_call_on_value_error():
         solver = solver_class(name)
         known = inspect.signature(solver).parameters

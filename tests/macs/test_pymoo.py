@@ -28,7 +28,7 @@ from pymoo.util.archive import MultiObjectiveArchive
 import macs
 from macs.decisions import ReferencePoint
 from macs.pymoo import MACS, _residuals, most_evaluations
-from macs.search.rounds import PLANNED
+from macs.search.rounds import PLANNED_EVALUATIONS
 
 STRICT = 1e-300
 """Tolerance of `macs.MACS` with which a point is feasible where it is for pymoo."""
@@ -304,7 +304,7 @@ def test_a_budget_may_come_and_go():
     between = algorithm.evaluator.n_eval
     algorithm.termination = get_termination("n_eval", between + 33)
     algorithm.run()
-    assert 100 < between < PLANNED and algorithm.evaluator.n_eval == between + 33
+    assert 100 < between < PLANNED_EVALUATIONS and algorithm.evaluator.n_eval == between + 33
 
 
 @pytest.mark.slow
@@ -392,8 +392,8 @@ def test_evaluated_points_are_not_evaluated_again():
     assert np.array_equal(ordered(res.X, res.F), of(front))
     res = minimize(problem, MACS(archive=15, sampling=known), ("n_gen", 1), seed=1)
     assert res.algorithm.evaluator.n_eval == 0 and len(res.algorithm.off) == 30
-    many = minimize(problem, MACS(sampling=np.random.default_rng(0).random((PLANNED + 5, 4))), ("n_gen", 1), seed=1)
-    assert many.algorithm.evaluator.n_eval == PLANNED + 5
+    many = minimize(problem, MACS(sampling=np.random.default_rng(0).random((PLANNED_EVALUATIONS + 5, 4))), ("n_gen", 1), seed=1)
+    assert many.algorithm.evaluator.n_eval == PLANNED_EVALUATIONS + 5
 
 
 def test_sampling_of_pymoo_draws_the_first_population():
@@ -471,7 +471,7 @@ def test_only_real_variables_with_bounds():
 
 
 def test_settings_are_refused_as_those_of_macs():
-    for name, value in {"agents": 2, "rho": 0.0, "exponent": 0.5, "mesh": "fine", "archive": MultiObjectiveArchive(), "sample": 3}.items():
+    for name, value in {"agents": 2, "rho": 0.5, "mesh": "fine", "archive": MultiObjectiveArchive(), "variant": "quick"}.items():
         with pytest.raises(ValueError, match=r"^MACS: ") as ours:
             MACS(**{name: value})
         with pytest.raises(ValueError) as theirs:

@@ -13,11 +13,11 @@ from plain import zdt
 
 from macs import MOPSO
 from macs.baselines.swarms import hypercubes, improved, moved, roulette, thin_out, velocities
-from macs.evaluation.evaluator import Box, Counts, Evaluation, Evaluator
+from macs.evaluation.evaluator import Counts, Evaluation, Evaluator, UnitBox
 from macs.pareto.dominance import nondominated
 
-PLAIN = Box(np.zeros(2), np.ones(2), np.zeros(2, dtype=bool))
-ROUND = Box(np.zeros(2), np.ones(2), np.array([True, False]))
+PLAIN = UnitBox(np.zeros(2), np.ones(2), np.zeros(2, dtype=bool))
+ROUND = UnitBox(np.zeros(2), np.ones(2), np.array([True, False]))
 
 
 # The grid

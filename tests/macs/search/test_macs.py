@@ -10,12 +10,13 @@ from boxes import boxed
 from fronts import distance_to_curve, inverted_distance, mean_distance
 from plain import dtlz, uf, zdt
 
+import macs.pymoo
 from macs.baselines import NSGA3
 from macs.pareto.dominance import dominates
-from macs.search.individual import individual_actions
 from macs.search.macs import MACS
+from macs.search.settings import GONE, Variant
 from macs.search.state import NO_DIRECTION
-from macs.search.trials import Trials
+from macs.solvers.solver import solver as named_solver
 from problems.cases.goddard import reference
 
 
@@ -74,16 +75,16 @@ def test_nothing_feasible_leaves_the_archive_empty_and_tells_the_closest():
     box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
     state = run(MACS(), box, 1000)
     assert len(state.archive) == 0
-    assert len(state.closest) == 1 and len(state.breeders) == 10
-    assert 1.0 <= state.closest.violation[0] < 1.02 and (np.diff(state.breeders.violation) >= 0.0).all()
-    assert state.closest.violation[0] <= min(state.breeders.violation[0], state.agents.violation.min())
+    assert len(state.closest) == 1 and len(state.infeasible) == 10
+    assert 1.0 <= state.closest.violation[0] < 1.02 and (np.diff(state.infeasible.violation) >= 0.0).all()
+    assert state.closest.violation[0] <= state.agents.violation.min()
 
 
 def test_from_infeasible_to_feasible():
     box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: np.abs(X[:, 1:] - 0.5) - 0.05)
     state = run(MACS(), box, 1500)
     assert len(state.archive) == 10
-    assert len(state.closest) == len(state.breeders) == 0
+    assert len(state.closest) == 0
     assert (np.abs(state.archive.Z[:, 1:] - 0.5) <= 0.05 + 1e-6).all()
 
 
@@ -151,7 +152,7 @@ def test_a_start_is_evaluated_first_and_too_many_are_thinned():
 def test_of_too_many_starts_the_best_become_agents():
     def begun(start, agents):
         box = boxed(lambda X: X, [(-9, 9)] * 2, constraints=lambda X: -X[:, 0] - 1)
-        state = MACS(agents=agents, social=0).begin(box, 100, np.random.default_rng(0), np.array(start, dtype=float))
+        state = MACS(agents=agents, variant=Variant(redraw=False)).begin(box, 100, np.random.default_rng(0), np.array(start, dtype=float))
         return state.agents.Z.tolist()
 
     infeasible = [[-9, 0], [-3, 0], [-5, 0]]
@@ -180,30 +181,13 @@ def test_more_objectives_than_points_and_no_budget_are_refused():
         {"agents": 2},
         {"agents": 3.5},
         {"archive": 0},
-        {"rho": 0},
-        {"F": 3},
-        {"CR": -0.1},
-        {"social": 1.1},
-        {"contraction": 1},
-        {"momentum": 1},
-        {"max_contractions": -1},
-        {"coordinates": 0},
         {"mesh_tolerance": 0},
         {"mesh": "fine"},
         {"refine": 1},
-        {"directions": 0},
-        {"rho": None},
-        {"reseed": "none"},
-        {"memory": 0},
-        {"experience": 2},
-        {"concentration": 0.5},
-        {"redraw": "no"},
-        {"social_moves": 1},
-        {"keep_velocity": None},
-        {"breeding": -1},
-        {"sample": 9},
-        {"exponent": 0.5},
-        {"exponent": 17},
+        {"polish_every": 0},
+        {"ceiling": None},
+        {"variant": "quick"},
+        {"variant": 3},
     ],
 )
 def test_settings_out_of_range_are_named(setting):
@@ -211,9 +195,24 @@ def test_settings_out_of_range_are_named(setting):
         MACS(**setting)
 
 
+@pytest.mark.parametrize("name", GONE)
+def test_a_setting_of_a_former_version_says_what_to_use(name):
+    words = f"{name} is no setting any more: "
+    for make in (MACS, MACS.paper, macs.pymoo.MACS, lambda **given: named_solver("macs", **given)):
+        with pytest.raises(ValueError, match=words) as caught:
+            make(**{name: 1})
+        assert "\n" not in str(caught.value)
+
+
+def test_variants_have_names():
+    assert MACS(variant="paper").variant == MACS.paper().variant == named_solver("macs", paper=True).variant
+    assert MACS.paper().about()["settings"]["variant"] == "paper" and MACS().about()["settings"]["variant"] == "default"
+    own = MACS(variant=Variant(repair=False))
+    assert own.about()["settings"]["variant"]["repair"] is False and own != MACS()
+
+
 def test_settings_of_the_paper():
     assert MACS.paper(archive=20).archive == 20
-    assert not MACS.paper().redraw
     assert MACS.paper().coordinates_to_scan(29, 10, 2, 100) == 29
     assert MACS().coordinates_to_scan(29, 10, 2, 10_000) == 1
     assert MACS().coordinates_to_scan(29, 0, 2, 10_000) == 29
@@ -225,13 +224,15 @@ def test_settings_of_the_paper():
 
 
 @pytest.mark.slow
-def test_lone_agents_are_as_many_as_the_budget_allows_and_are_never_moved_to_the_archive():
+def test_agents_without_a_direction_are_as_many_as_the_budget_allows_and_are_never_moved_to_the_archive(monkeypatch):
+    many = MACS(archive=100)
     budgets = (9_999, 35_999, 36_000, 300_000, 1_000_000)
-    assert [MACS(archive=100).lone_agents(2, budget) for budget in budgets] == [0, 0, 1, 45, 45]
-    assert [MACS(archive=100).lone_agents(3, budget) for budget in budgets] == [0, 0, 0, 22, 45]
-    assert [MACS(archive=points).lone_agents(3, 1_000_000) for points in (3, 10, 11, 12, 150)] == [0, 0, 0, 1, 70]
-    assert MACS(archive=150).lone_agents(4, 300_000) == MACS.paper(archive=100).lone_agents(2, 300_000) == 0
-    settings, box = MACS(agents=4, archive=20, lone=5), boxed(schaffer, [(-2, 2)] * 3)
+    assert [many.undirected_agents(2, budget) for budget in budgets] == [0, 0, 1, 45, 45]
+    assert [many.undirected_agents(3, budget) for budget in budgets] == [0, 0, 0, 22, 45]
+    assert [MACS(archive=points).undirected_agents(3, 1_000_000) for points in (3, 10, 11, 12, 150)] == [0, 0, 0, 1, 70]
+    assert MACS(archive=150).undirected_agents(4, 300_000) == MACS.paper(archive=100).undirected_agents(2, 300_000) == 0
+    monkeypatch.setattr(MACS, "undirected_agents", lambda self, m, budget: 5)
+    settings, box = MACS(agents=4, archive=20), boxed(schaffer, [(-2, 2)] * 3)
     state = settings.begin(box, 2000, np.random.default_rng(0))
     first = state.agents.F[4:].copy()
     assert len(first) == 5
@@ -244,33 +245,16 @@ def test_lone_agents_are_as_many_as_the_budget_allows_and_are_never_moved_to_the
     assert (last != first).any()
 
 
-@pytest.mark.parametrize(("m", "tried"), [(2, 2), (3, 12)])
-def test_where_the_front_is_a_surface_lone_agents_try_all_coordinates(m, tried):
-    """Where nothing is better than anything, each lone agent that acts tries both sides of all six, and a difference; else of one."""
-    settings, box = MACS(agents=4, archive=m, lone=2, sample=8), boxed(lambda X: np.eye(m)[(X[:, 0] * 1e6).astype(int) % m], [(0, 1)] * 6)
-    state = settings.begin(box, 4000, np.random.default_rng(0))
-    while len(state.archive) < m or state.iteration < 5:
-        settings.advance(state, box, 4000)
-    state.ahead = 0.0
-    trials = Trials(settings, state, box, 4000)
-    state.agents.velocity[:] = 0.0
-    individual_actions(trials)
-    assert set(trials.tried[4:]) == {tried + 1}
-
-
 @pytest.mark.slow
-def test_lone_agents_get_evaluations_as_long_as_they_gain():
-    """Each comes to the front of DTLZ2, and then nothing is left for it to gain. Hardly more is left for the others, so that its share
-    falls, but not to the least."""
-    settings, box = MACS(archive=50, lone=5), boxed(*dtlz(2, 3)[:2])
-    state, parts, gains = settings.begin(box, 20_000, np.random.default_rng(1)), [], []
+def test_agents_without_a_direction_get_evaluations_as_long_as_they_gain(monkeypatch):
+    """Each comes to the front of DTLZ2, and then nothing is left for it to gain."""
+    monkeypatch.setattr(MACS, "undirected_agents", lambda self, m, budget: 5)
+    settings, box = MACS(archive=50), boxed(*dtlz(2, 3)[:2])
+    state, parts = settings.begin(box, 20_000, np.random.default_rng(1)), []
     while state.evaluations < 20_000:
         settings.advance(state, box, 20_000)
-        gained, tried = state.progress[1]
-        parts.append(tried / state.progress[:, 1].sum())
-        gains.append(gained / tried)
+        parts.append(state.undirected.cost[1] / state.undirected.cost.sum())
     assert max(parts) > 0.4 and parts[-1] < 0.35
-    assert gains[-1] < 1e-4 * max(gains)
 
 
 def distances(problem, seeds, evaluations):

@@ -1,18 +1,17 @@
 """Settings of `MACS.paper()`: the directions, social actions, velocities and first re-seeding of the authors."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from boxes import boxed
 
-from macs.evaluation.evaluator import Evaluation
 from macs.pareto.archive import Archive
-from macs.pareto.spread import pair_energies
 from macs.search.individual import individual_actions
 from macs.search.macs import MACS
+from macs.search.settings import PAPER, Variant
 from macs.search.social import assign, social_actions
-from macs.search.state import remember
 from macs.search.trials import Trials
 
 
@@ -50,12 +49,8 @@ def test_directions_are_equally_spaced_and_kept_for_the_whole_run():
         assert np.array_equal(owned(state), first)
 
 
-@pytest.mark.parametrize(
-    ("overrides", "expected"), [({"agents": 20}, 20), ({"social": 0.5}, 5), ({"social": 0.0}, 1), ({"directions": 40}, 40)]
-)
-def test_there_are_as_many_directions_as_social_agents_unless_overridden(overrides, expected):
-    assert MACS.paper(**overrides).directions == expected
-    assert MACS.paper(directions=None).directions is None
+def test_there_are_as_many_directions_as_agents():
+    assert [MACS.paper(agents=n).directions_to_draw_from(2) for n in (4, 20)] == [4, 20] and MACS().directions_to_draw_from(2) == 200
 
 
 def test_social_actions_only_feed_the_archive():
@@ -67,7 +62,7 @@ def test_social_actions_only_feed_the_archive():
         unchanged = [np.array_equal(value, vars(before.agents)[name]) for name, value in vars(state.agents).items()]
         assert len(trials.seen) == seen + 1
         assert state.evaluations == before.evaluations + len(trials.seen[-1].F)
-        assert all(unchanged) == np.array_equal(state.experience, before.experience) == (settings == MACS.paper())
+        assert all(unchanged) == (settings == MACS.paper())
 
 
 @pytest.mark.parametrize("settings", [MACS.paper(), MACS()])
@@ -77,7 +72,7 @@ def test_inertia_erases_the_velocity(settings):
     individual()
     assert (np.ptp(state.agents.Z, axis=1) == 0.0).all()  # all coordinates alike: along the velocity
     assert (state.agents.Z < 0.0).all()
-    assert (state.agents.velocity == 0.0).all() == (settings == MACS.paper())
+    assert (state.agents.velocity == 0.0).all()
 
 
 def test_pattern_search_leaves_its_displacement():
@@ -88,8 +83,8 @@ def test_pattern_search_leaves_its_displacement():
     assert np.allclose(state.agents.velocity * 4, state.agents.Z)
 
 
-@pytest.mark.parametrize("settings", [MACS.paper(CR=1.0), MACS(CR=1.0)])
-def test_differential_evolution_leaves_none(settings):
+def test_differential_evolution_leaves_none():
+    settings = MACS(variant=replace(PAPER, CR=1.0))
     # Off the diagonal everything is worse: only differences of agents on it lead along it.
     state, individual, *_ = begun(settings, lambda X: np.stack([np.abs(X[:, 0]) + 99 * np.abs(X[:, 1] - X[:, 0])] * 2, axis=1), d=2)
     state.agents.Z[:] = np.linspace(0.1, 1.0, 10)[:, None]
@@ -99,7 +94,7 @@ def test_differential_evolution_leaves_none(settings):
     individual()
     moved = (before != state.agents.Z).any(axis=1)
     assert 0 < moved.sum() < 10
-    assert (state.agents.velocity[moved] == 0.0).all() == (settings.momentum == 0.0)
+    assert (state.agents.velocity[moved] == 0.0).all()
     assert (state.agents.velocity[~moved] == [0.1, -0.1]).all()
 
 
@@ -112,7 +107,7 @@ def test_the_only_point_of_the_archive_gets_the_nearest_agent_of_an_orthogonal_d
     state.agents.Z[:], state.agents.F[:] = 1.0, [3.0, 0.0]
     state.agents.F[[0, 1, 2]] = [[np.nan, np.nan], [2.0, 2.0], [0.0, 3.0]]
     assign(state, settings)
-    assert np.flatnonzero((state.agents.Z == 0.0).all(axis=1)).tolist() == ([1] if settings == MACS.paper() else [])
+    assert np.flatnonzero((state.agents.Z == 0.0).all(axis=1)).tolist() == [1]
 
 
 def test_without_feasible_points_no_agent_moves():
@@ -125,7 +120,7 @@ def test_without_feasible_points_no_agent_moves():
 
 @pytest.mark.parametrize(("F", "CR"), [(0.5, 0.25), (1.5, 1.0)])
 def test_differential_evolution_takes_its_weight_and_its_probability_from_the_settings(monkeypatch, F, CR):
-    state, individual, *_ = begun(MACS(F=F, CR=CR), lambda X: np.stack([X[:, 0] ** 2] * 2, axis=1))
+    state, individual, *_ = begun(MACS(variant=Variant(F=F, CR=CR)), lambda X: np.stack([X[:, 0] ** 2] * 2, axis=1))
     state.agents.F[:] = 0.0  # nothing is better, so that all come to this action
     used = []
 
@@ -136,22 +131,3 @@ def test_differential_evolution_takes_its_weight_and_its_probability_from_the_se
     monkeypatch.setattr("macs.search.individual.differential", differential)
     individual()
     assert used == [(F, CR)]
-
-
-def test_the_archive_of_a_search_has_the_exponent_of_the_settings():
-    """Of points of a sphere, those that are kept for each of two exponents are the better ones by its own energy."""
-    points = np.abs(np.random.default_rng(0).standard_normal((60, 3)))
-    F = 1.0 - points / np.linalg.norm(points, axis=1, keepdims=True)
-    box, kept = boxed(lambda X: X, [(0, 1)] * 3), {}
-    for exponent in (1.0, 16.0):
-        settings = MACS(agents=4, archive=20, exponent=exponent)
-        state = settings.begin(box, 10, np.random.default_rng(0))
-        state.archive = Archive(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
-        remember(state, [Evaluation(F, F, np.zeros(60), np.full(60, "converged"))], settings, box)
-        kept[exponent] = [int(np.flatnonzero((row == F).all(axis=1))[0]) for row in state.archive.F]
-
-    def energy(rows, exponent):
-        return pair_energies(F, exponent)[np.ix_(rows, rows)].sum()
-
-    assert energy(kept[1.0], 1.0) < energy(kept[16.0], 1.0)
-    assert energy(kept[16.0], 16.0) < energy(kept[1.0], 16.0)

@@ -34,18 +34,16 @@ def prepared():
     agents = state.agents
     agents.Z[:], agents.velocity[:] = [0.8, 0.8, 0.5], 0.0
     agents.F[:] = [0.8, 0.64]
-    state.experience = np.empty((0, 2))
     return box, state, Trials(settings, state, box, 1000)
 
 
-def test_velocity_and_experience_are_what_was_achieved():
+def test_the_velocity_is_what_was_achieved():
     _, state, trials = prepared()
     rows = np.array([2, 5])
     X = trials.positions(rows)
     success = trials.evaluate_and_accept(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]))
     assert success.tolist() == [True, False]
     assert np.allclose(state.agents.velocity[2], [-0.2, 0.0])
-    assert np.allclose(state.experience, [[-0.2, 0.0]])
     assert np.allclose(state.agents.Z[2], [0.6, 0.6, 0.5])
     assert (state.agents.velocity[5] == 0.0).all()
 
@@ -69,7 +67,6 @@ def test_what_is_only_looked_at_is_seen_and_changes_no_agent():
     assert trials.seen == [result]
     assert state.evaluations == box.counts.evaluations == before.evaluations + 2
     assert all(np.array_equal(value, vars(before.agents)[name]) for name, value in vars(state.agents).items())
-    assert len(state.experience) == 0
 
 
 def test_a_step_that_was_mostly_undone_is_a_success_without_credit():
@@ -77,7 +74,7 @@ def test_a_step_that_was_mostly_undone_is_a_success_without_credit():
     rows = np.array([0, 1])
     X = trials.positions(rows)
     assert trials.evaluate_and_accept(rows, X, X + np.array([[-0.01, 0.4], [-0.4, 0.01]])).all()
-    assert trials.credited[:2].tolist() == [False, True]
+    assert trials.successful[:2].tolist() == [False, True]
 
 
 def test_candidates_start_from_the_memory_of_their_own_agent():
@@ -90,14 +87,6 @@ def test_candidates_start_from_the_memory_of_their_own_agent():
     assert box.started_from[0].tolist() == [7.0] * 10
 
 
-def test_proposals_that_do_not_move_cost_nothing():
-    box, state, trials = prepared()
-    before = state.evaluations
-    X = trials.positions()
-    assert not trials.evaluate_and_accept(np.arange(10), X, X).any()
-    assert (state.evaluations, box.counts.evaluations) == (before, before)
-
-
 def test_a_proposal_that_is_only_as_good_for_the_direction_of_its_agent_is_no_success():
     """The last coordinate does not matter, so that a step along it gives the same objectives; one that is better by little is a success."""
     _, state, trials = prepared()
@@ -106,7 +95,7 @@ def test_a_proposal_that_is_only_as_good_for_the_direction_of_its_agent_is_no_su
     before = state.agents.Z[rows].copy()
     X = trials.positions(rows)
     assert not trials.evaluate_and_accept(rows, X, X + np.array([[0.0, 0.1], [0.0, 0.2]])).any()
-    assert np.array_equal(state.agents.Z[rows], before) and not state.agents.velocity[rows].any() and not len(state.experience)
+    assert np.array_equal(state.agents.Z[rows], before) and not state.agents.velocity[rows].any()
     assert trials.evaluate_and_accept(rows, X, X + np.array([[-1e-9, 0.1], [0.0, 0.2]])).tolist() == [True, False]
 
 

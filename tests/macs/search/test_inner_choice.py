@@ -1,4 +1,4 @@
-"""How MACS divides its effort among inner solvers: who gets the next proposals, and what points bring to a front."""
+"""How MACS chooses among inner solvers: which gets the next proposals, and what points bring to a front."""
 
 from __future__ import annotations
 
@@ -12,58 +12,53 @@ import pytest
 from macs import MACS
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import Evaluation
-from macs.search.effort import CHEAP, DEAR, LEAST, Gains, credited, evaluated, no_effort, spent, ways_of
+from macs.search.state import Credit
+from macs.search.trials import INNER_SHARES, Gains, choose_inner_solvers
 from problems import Problem, load
 from problems.compiled import CompiledProblem
 from transcription import DFET, parse
-from transcription.inner import Auto, inner_solver
+from transcription.inner import inner_solver
 
 
-def effort(*rows) -> np.ndarray:
-    """Of each way, and of gradient solves: what it brought, for which work, all work, evaluations, of which none was feasible."""
-    return np.array([(*row, 0) for row in rows], dtype=float)
+def known(*rows) -> tuple[Credit, np.ndarray]:
+    """Of each inner solver, and of gradient solves: what it gained, at which cost, all work, and evaluations."""
+    gained, cost, work, evaluations = np.array(rows, dtype=float).T
+    return Credit(gained, cost), np.stack([work, evaluations, np.zeros(len(work))], axis=1)
 
 
-def test_proposals_go_to_the_way_that_brings_most_for_its_work():
-    known = effort((0.1, 100, 5000, 500), (0.8, 200, 5000, 100), (0.1, 500, 5000, 50), (0.0, 0.0, 0.0, 0.0))
-    assert set(ways_of(known, 10, None)) == {1}
-    known[0, 0] = 1.0
-    assert (ways_of(known, 10, None) == 0).sum() >= 9
+NO_SOLVES = (0.0, 0.0, 0.0, 0.0)
+
+
+def test_proposals_go_to_the_solver_that_brings_most_for_its_work():
+    credit, spent = known((0.1, 100, 5000, 500), (0.8, 200, 5000, 100), (0.1, 500, 5000, 50), NO_SOLVES)
+    assert set(choose_inner_solvers(credit, spent, 10, None)) == {1}
+    credit.gained[0] = 1.0
+    assert (choose_inner_solvers(credit, spent, 10, None) == 0).sum() >= 9
 
 
 def test_where_gradient_solves_bring_most_proposals_are_propagated():
-    known = effort((0.1, 100, 5000, 500), (0.8, 200, 50000, 100), (0.1, 500, 50000, 50), (2.0, 100, 1000, 1))
-    assert (ways_of(known, 10, 20) == 0).all()
+    ways = known((0.1, 100, 5000, 500), (0.8, 200, 50000, 100), (0.1, 500, 50000, 50), (2.0, 100, 1000, 1))
+    assert (choose_inner_solvers(*ways, 10, 20) == 0).all()
 
 
-def test_a_way_that_takes_less_has_its_share_of_evaluations():
-    known = effort((0.0, 100, 50, CHEAP * 100 - 1), (0.8, 200, 5000, 100 - CHEAP * 100), (0.0, 1, 5000, 1), (0.0, 0.0, 0.0, 0.0))
-    assert (ways_of(known, 10, None) == 0).all()
-    known[0, 3] += 2.0
-    assert (ways_of(known, 10, None) == 1).all()
+def test_a_solver_that_takes_less_has_its_share_of_evaluations():
+    credit, spent = known((0.0, 100, 50, 9), (0.8, 200, 5000, 90), (0.0, 1, 5000, 1), NO_SOLVES)
+    assert (choose_inner_solvers(credit, spent, 10, None) == 0).all()
+    spent[0, 1] += 2.0
+    assert (choose_inner_solvers(credit, spent, 10, None) == 1).all()
 
 
-def test_ways_that_take_more_have_their_share_of_work_and_of_solves_to_come():
+def test_solvers_that_take_more_have_their_share_of_work_and_of_solves_to_come():
     """900 by propagation, at one of work each; 45 gradient solves, of ten each, are to come. A candidate takes 10 and 100."""
-    known = effort((0.0, 1, 900, 900), (0.0, 1, 0, 0), (0.0, 1, 0, 0), (1.0, 10, 0, 0))
-    assert ways_of(known, 10, None).tolist() == [0] * 8 + [2, 1], "one each, as long as nobody knows what they take"
-    making = LEAST * 900
-    assert ways_of(known, 10, None, making).tolist() == [0] * 8 + [2, 1], "their shares are worth as much as their functions"
-    assert (ways_of(known, 10, None, 1.01 * making)[:9] == 0).all() and (ways_of(known, 10, None, 9 * making) == 0).all()
-    known[1, :4], known[2, :4] = (0.01, 1, 10, 1), (0.0, 1, 100, 1)
-    share = DEAR - LEAST
-    left = share * (900 + 110) - 10, share * (900 + 110 + 902 / 20 * 10) - 10
-    assert [(ways_of(known, 40, every) == 1).sum() for every in (None, 20)] == [int(one / 10) for one in left]
-    assert (ways_of(known, 40, 20) == 2).sum() == 0, "it has had its least share"
-
-
-def test_what_was_brought_is_forgotten_but_not_what_gradient_solves_brought():
-    after = credited(no_effort(2, 1000), 0, 0.5, 30, 10, 7)
-    assert after.tolist() == [[0.5, 30, 30, 10, 7], [0, 0, 0, 0, 0], [1.0, 1000, 0, 0, 0]]
-    again = credited(after, 1, 0.0, 70, 5)
-    assert again[:2].tolist() == [[0.45, 27, 30, 10, 7], [0, 70, 70, 5, 0]] and (again[2] == after[2]).all()
-    one, two = {"evaluations": 10, "feasible": 7, "work": 30}, {"evaluations": 5, "feasible": 0, "work": 70}
-    assert spent(again, ("one", "two")) == {"one": one, "two": two}
+    credit, spent = known((0.0, 1, 900, 900), (0.0, 1, 0, 0), (0.0, 1, 0, 0), (1.0, 10, 0, 0))
+    compiling = INNER_SHARES.least * 900
+    assert choose_inner_solvers(credit, spent, 10, None, compiling).tolist() == [0] * 8 + [2, 1], "one each, to know what they take"
+    assert (choose_inner_solvers(credit, spent, 10, None, 9 * compiling) == 0).all(), "their functions would take more than their share"
+    credit, spent = known((0.0, 1, 900, 900), (0.01, 1, 10, 1), (0.0, 1, 100, 1), (1.0, 9, 0, 0))
+    share = INNER_SHARES.dearer - INNER_SHARES.least
+    left = share * (900 + 110) - 10, share * (900 + 110 + 902 / 20 * 9) - 10
+    assert [(choose_inner_solvers(credit, spent, 40, every) == 1).sum() for every in (None, 20)] == [int(one / 10) for one in left]
+    assert (choose_inner_solvers(credit, spent, 40, 20) == 2).sum() == 0, "it has had its least share"
 
 
 def found(F, violation) -> Evaluation:
@@ -73,10 +68,9 @@ def found(F, violation) -> Evaluation:
 
 def test_points_bring_what_they_improve_on_average_over_the_directions():
     """With two directions, the single objectives: from 0.4 to 0.1 of the range in the one, nothing in the other."""
-    front = MACS(agents=4, archive=5, directions=2)
     box = Bilevel(DFET(3, 3).nlp(load("goddard")), inner_solver("auto"), 1e-6)
-    state = front.begin(box, 100, np.random.default_rng(0))
-    assert len(state.directions) == 2 and (np.sort(state.directions, axis=1) == [0.0, 1.0]).all()
+    state = MACS(agents=4, archive=5).begin(box, 100, np.random.default_rng(0))
+    state.directions = np.eye(2)
     state.archive = state.archive.take(np.arange(2))
     state.archive.F[:] = [[0.4, 0.5], [0.9, 0.0]]
     state.ideal, state.nadir = np.zeros(2), np.ones(2)
@@ -112,24 +106,6 @@ def swinging() -> CompiledProblem:
 
 
 MESH = DFET(6, 4)
-
-
-def evaluator(tolerance: float = 1e-6) -> Bilevel:
-    return Bilevel(MESH.nlp(swing()), Auto(), tolerance)
-
-
-@pytest.mark.slow
-def test_proposals_keep_their_order():
-    box, rng = evaluator(), np.random.default_rng(3)
-    state = MACS(agents=4, archive=4).begin(box, 200, rng)
-    Z = state.agents.Z.copy()
-    Z[:, box.free] = np.clip(Z[:, box.free] + 0.01 * rng.standard_normal(Z[:, box.free].shape), box.lower, box.upper)
-    state.effort[:] = 0.0
-    assert len(set(ways_of(state.effort, 4, None))) > 1
-    together = evaluated(state, box, Z, Gains(state, 1e-6), None)
-    for z, nearest in zip(Z, together.Z, strict=True):
-        assert np.abs(nearest - z)[box.free].max() < 0.5 * np.ptp([box.lower, box.upper], axis=0).max()
-        assert np.abs(nearest - z)[box.free].sum() <= min(np.abs(nearest - other)[box.free].sum() for other in Z) + 1e-9
 
 
 @pytest.mark.slow
@@ -175,13 +151,3 @@ def test_others_use_the_fixed_rule():
         for inner in ("projection", "auto")
     )
     assert np.array_equal(auto.F, projected.F) and "ways" not in auto.stats
-
-
-@pytest.mark.slow
-def test_without_gradients_candidates_are_made_feasible_as_by_the_fixed_rule():
-    """Nothing else would: what is only propagated costs little, and is hardly ever feasible."""
-
-    def found(inner):
-        return MACS(agents=4, archive=5, refine=False).solve(swinging(), MESH, evaluations=60, seed=1, inner=inner, verify=None)
-
-    assert np.array_equal(found("auto").F, found("projection").F)

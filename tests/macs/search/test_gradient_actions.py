@@ -11,7 +11,7 @@ from macs import MACS, payoff
 from macs.evaluation.bilevel import Bilevel
 from macs.gradients import multistart
 from macs.gradients.multistart import MULTISTART, MultistartSolver
-from macs.search import opening
+from macs.search import gradient_actions
 from macs.search.state import SearchState
 from problems import Problem, load
 from transcription import DFET, Collocation
@@ -58,7 +58,7 @@ def recorded(monkeypatch) -> list[np.ndarray]:
             starts.append(given)
             super().__init__(nlp, given, *rest)
 
-    monkeypatch.setattr(opening, "MultistartSolver", Recorded)
+    monkeypatch.setattr(gradient_actions, "MultistartSolver", Recorded)
     return starts
 
 
@@ -71,7 +71,7 @@ def test_they_are_sought_from_what_was_given_or_guessed(monkeypatch) -> None:
     given = given[np.argsort(-evaluator.evaluate(given).violation)]
     MACS(agents=4).begin(evaluator, 200, rng, given)
     np.testing.assert_array_equal(starts[0], given[1:])
-    monkeypatch.setattr(opening, "guessed_start", lambda nlp: given[:1])
+    monkeypatch.setattr(gradient_actions, "guessed_start", lambda nlp: given[:1])
     MACS(agents=4).begin(evaluator_of_vectors(), 200, rng)
     np.testing.assert_array_equal(starts[1], given[:1])
 
@@ -104,18 +104,10 @@ def test_where_the_way_is_chosen_solves_find_points_along_the_front() -> None:
     assert state.ideal[0] == pytest.approx(2 / np.sqrt(5), rel=1e-2), "full thrust, then none: 2 sqrt(1 / 5)"
 
 
-@pytest.mark.slow
-def test_starts_agree_soon_and_are_never_more_than_the_budget_allows() -> None:
-    few, many = (projecting(walk(), METHOD) for _ in range(2))
-    for evaluator, budget in ((few, 20), (many, 10_000)):
-        MACS(agents=4, archive=6).begin(evaluator, budget, np.random.default_rng(0))
-    assert few.counts.gradient_solves < many.counts.gradient_solves < 60
-
-
 def test_where_solves_for_feasibility_find_nothing_no_candidate_is_projected() -> None:
     evaluator = projecting(walk(least=0.5), METHOD)
     state = begun(evaluator)
-    assert not len(state.archive) and not len(state.optima) and MACS().has_settled(state)
+    assert not len(state.archive) and not len(state.optima) and MACS().ended(state) == "settled"
     assert evaluator.counts.evaluations == 10 and evaluator.counts.fallbacks == 0 and len(state.closest)
 
 
@@ -125,9 +117,9 @@ def test_what_nothing_makes_feasible_is_projected(monkeypatch) -> None:
     evaluator = projecting(walk(least=0.5), METHOD)
     state = begun(evaluator)
     assert not len(state.archive) and not len(state.optima)
-    assert evaluator.counts.evaluations == 20 and evaluator.counts.fallbacks == 10 == state.hopeless
+    assert evaluator.counts.evaluations == 20 and evaluator.counts.fallbacks == 10 == state.gradients.hopeless
     few = projecting(walk(least=0.5), METHOD)
-    MACS(agents=4, sample=10).begin(few, 13, np.random.default_rng(0))
+    MACS(agents=4).begin(few, 13, np.random.default_rng(0))
     assert few.counts.evaluations == 13, "as far as the budget goes"
 
 
@@ -142,18 +134,20 @@ def test_they_begin_at_what_was_given_and_not_at_its_propagated_states(monkeypat
     np.testing.assert_array_equal(starts[1], given)
 
 
-@pytest.mark.parametrize(("several", "problem", "method"), [(False, walk(), METHOD), (True, load("landing_site", landers=1), DFET(1, 3))])
-def test_worse_optima_from_other_starts_are_noticed(several, problem, method) -> None:
+@pytest.mark.parametrize(
+    ("multimodal", "problem", "method"), [(False, walk(), METHOD), (True, load("landing_site", landers=1), DFET(1, 3))]
+)
+def test_worse_optima_from_other_starts_are_noticed(multimodal, problem, method) -> None:
     evaluator = projecting(problem, method)
     state = begun(evaluator, archive=6)
-    found, worse = opening.anew(state.archive, evaluator, 6, 12, 0, state.alike, np.random.default_rng(1))
-    assert worse is several and len(found.F) >= 6
+    found, worse = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, state.gradients.unimodal, np.random.default_rng(1))
+    assert worse is multimodal and len(found.F) >= 6
 
 
 def test_ends_that_were_alike_are_not_sought_again_where_others_were_not(monkeypatch) -> None:
     evaluator, tasks = projecting(walk(), METHOD), []
     state = begun(evaluator, archive=6)
-    assert state.alike.all() and not state.several
+    assert state.gradients.unimodal.all() and not state.gradients.multimodal
     original = MultistartSolver.from_vector
 
     def noted(self, start, task):
@@ -163,5 +157,5 @@ def test_ends_that_were_alike_are_not_sought_again_where_others_were_not(monkeyp
     monkeypatch.setattr(MultistartSolver, "from_vector", noted)
     for alike, ends in (([True, True], [[0], [1], [0], [1]]), ([True, False], [[1]] * 4)):
         tasks.clear()
-        opening.anew(state.archive, evaluator, 6, 6, 0, np.array(alike), np.random.default_rng(1))
+        gradient_actions.restart_solves(state.archive, evaluator, 6, 6, 0, np.array(alike), np.random.default_rng(1))
         assert tasks == [*ends[:2], [0, 1], *ends[2:], [0, 1]], "two of three are ends"

@@ -1,25 +1,28 @@
 """Linear models of constraints from points around, and the steps to their zero, against projections in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs.evaluation import linear_models
-from macs.evaluation.evaluator import Box
-from macs.evaluation.linear_models import BEYOND, MEMORY, Samples, steps_to_zero
+from macs.evaluation.evaluator import UnitBox
+from macs.search import repair
+from macs.search.repair import MODEL_LIMITS, steps_to_zero
+from macs.search.state import KEPT_SAMPLES, ResidualSamples
 
 SEEDS = st.integers(0, 2**32 - 1)
 
 
 def box(d, wraps=()):
-    return Box(np.zeros(d), np.ones(d), np.isin(np.arange(d), wraps))
+    return UnitBox(np.zeros(d), np.ones(d), np.isin(np.arange(d), wraps))
 
 
 def around(x, radius, count, residual, rng):
     """Points near x with their residuals."""
     X = x + radius * rng.uniform(-1.0, 1.0, (count, len(x)))
-    return Samples.none(len(x)).joined(X, residual(X))
+    return ResidualSamples.none(len(x)).joined(X, residual(X))
 
 
 @given(SEEDS, st.integers(1, 8), st.data())
@@ -31,14 +34,14 @@ def test_the_step_is_the_projection_onto_planes(seed, d, data):
     b = A @ (x + 0.01 * rng.uniform(-1.0, 1.0, d))
     known = around(x, 0.2, 2 * d + 2, lambda X: X @ A.T - b, rng)
     step = steps_to_zero(box(d), x[None], (A @ x - b)[None], known)[0]
-    assert step == pytest.approx(-(1.0 + BEYOND) * np.linalg.pinv(A) @ (A @ x - b), rel=1e-6, abs=1e-12)
+    assert step == pytest.approx(-(1.0 + MODEL_LIMITS.beyond) * np.linalg.pinv(A) @ (A @ x - b), rel=1e-6, abs=1e-12)
 
 
 def test_constraints_without_a_residual_have_no_part():
     rng, x = np.random.default_rng(1), np.array([0.5, 0.5, 0.5])
     known = around(x, 0.1, 8, lambda X: np.column_stack([X[:, 0] - 0.4, np.maximum(X[:, 1] - 0.6, 0.0)]), rng)
     step = steps_to_zero(box(3), x[None], np.array([[0.1, 0.0]]), known)[0]
-    assert step == pytest.approx([-0.1 * (1.0 + BEYOND), 0.0, 0.0], abs=1e-9)
+    assert step == pytest.approx([-0.1 * (1.0 + MODEL_LIMITS.beyond), 0.0, 0.0], abs=1e-9)
     assert x[0] + step[0] < 0.4 - 1e-3, "inside of the limit"
 
 
@@ -54,7 +57,7 @@ def test_limits_on_absolute_values_are_met_from_either_side(d, most, monkeypatch
         amount = np.abs(a @ x - b)[None, None]
         met.append(abs(a @ (x + steps_to_zero(box(d), x[None], amount, known)[0]) - b) < 0.021 * amount)
         with monkeypatch.context() as alone:
-            alone.setattr(linear_models, "FOLDS", 0)
+            alone.setattr(repair, "MODEL_LIMITS", replace(MODEL_LIMITS, rounds=0))
             without_signs.append(abs(a @ (x + steps_to_zero(box(d), x[None], amount, known)[0]) - b) < 0.021 * amount)
     assert np.mean(met) > most and np.mean(without_signs) < 0.25
 
@@ -71,7 +74,7 @@ def test_limits_on_one_side_are_not_taken_for_absolute_values(d, monkeypatch):
         known = around(x[0], (0.02, 0.1, 0.3)[k // 3 % 3], 4 * d + 4, ball, rng)
         step = steps_to_zero(box(d), x, ball(x), known)
         with monkeypatch.context() as without:
-            without.setattr(linear_models, "FOLDS", 0)
+            without.setattr(repair, "MODEL_LIMITS", replace(MODEL_LIMITS, rounds=0))
             changed += not np.array_equal(step, steps_to_zero(box(d), x, ball(x), known))
     assert changed <= 2
 
@@ -81,7 +84,7 @@ def test_variables_at_a_bound_leave_the_rest_to_the_others():
     rng, x = np.random.default_rng(1), np.array([0.02, 0.5, 0.5])
     known = around(x, 0.4, 8, lambda X: X.sum(axis=1, keepdims=True) - 0.6, rng)
     step = steps_to_zero(box(3), x[None], np.array([[0.42]]), known)[0]
-    over = BEYOND * 0.42 / 2
+    over = MODEL_LIMITS.beyond * 0.42 / 2
     assert x + step == pytest.approx([0.0, 0.3 - over, 0.3 - over], abs=1e-9)
 
 
@@ -89,7 +92,7 @@ def test_what_no_point_of_the_box_can_meet_ends_at_its_corner():
     rng, x = np.random.default_rng(1), np.array([0.9, 0.8])
     known = around(x, 0.3, 5, lambda X: X.sum(axis=1, keepdims=True) + 1.0, rng)
     far = np.vstack([known.X, [[-1.0, -1.0]]])
-    step = steps_to_zero(box(2), x[None], np.array([[2.7]]), Samples(far, far.sum(axis=1, keepdims=True) + 1.0))[0]
+    step = steps_to_zero(box(2), x[None], np.array([[2.7]]), ResidualSamples(far, far.sum(axis=1, keepdims=True) + 1.0))[0]
     assert x + step == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
@@ -98,27 +101,27 @@ def test_constraints_that_say_nearly_the_same_do_not_drive_a_step_far():
     rng, x = np.random.default_rng(1), np.array([0.5, 0.5])
     A, b = np.array([[1.0, 0.0], [1.0, 1e-6]]), np.array([0.4, 0.41])
     step = steps_to_zero(box(2), x[None], (A @ x - b)[None], around(x, 0.4, 6, lambda X: X @ A.T - b, rng))[0]
-    assert step == pytest.approx([-0.095 * (1.0 + BEYOND), 0.0], abs=1e-6)
+    assert step == pytest.approx([-0.095 * (1.0 + MODEL_LIMITS.beyond), 0.0], abs=1e-6)
 
 
 def test_steps_take_the_shorter_way_around():
     x = np.array([0.98, 0.5])
     X = np.array([[0.02, 0.5], [0.96, 0.5], [0.98, 0.6]])
     turn = lambda X: (np.mod(X[:, :1] - 0.5, 1.0) - 0.5) - 0.01  # noqa: E731 - 0 at 0.01, which is beyond the bound
-    step = steps_to_zero(box(2, [0]), x[None], turn(x[None]), Samples(X, turn(X)))[0]
-    assert step == pytest.approx([0.03 * (1.0 + BEYOND), 0.0], abs=1e-9)
+    step = steps_to_zero(box(2, [0]), x[None], turn(x[None]), ResidualSamples(X, turn(X)))[0]
+    assert step == pytest.approx([0.03 * (1.0 + MODEL_LIMITS.beyond), 0.0], abs=1e-9)
 
 
 def test_no_step_is_longer_than_what_is_known_reaches():
     x = np.array([0.5])
-    known = Samples(np.array([[0.51], [0.49]]), np.array([[0.99], [1.01]]))
+    known = ResidualSamples(np.array([[0.51], [0.49]]), np.array([[0.99], [1.01]]))
     assert steps_to_zero(box(1), x[None], np.array([[1.0]]), known)[0] == pytest.approx([0.01])
 
 
 def test_where_nothing_else_is_known_no_step_is_made():
     x = np.array([[0.5, 0.5]])
-    assert not steps_to_zero(box(2), x, np.array([[1.0]]), Samples(x, np.array([[1.0]]))).any()
-    flat = Samples(np.array([[0.4, 0.5], [0.6, 0.5]]), np.ones((2, 1)))
+    assert not steps_to_zero(box(2), x, np.array([[1.0]]), ResidualSamples(x, np.array([[1.0]]))).any()
+    flat = ResidualSamples(np.array([[0.4, 0.5], [0.6, 0.5]]), np.ones((2, 1)))
     assert not steps_to_zero(box(2), x, np.array([[1.0]]), flat).any()
 
 
@@ -137,7 +140,7 @@ def test_a_few_steps_lead_to_a_curved_constraint():
 
 
 def test_only_the_last_points_are_kept():
-    first = Samples.none(1).joined(np.zeros((MEMORY, 1)), np.zeros((MEMORY, 2)))
+    first = ResidualSamples.none(1).joined(np.zeros((KEPT_SAMPLES, 1)), np.zeros((KEPT_SAMPLES, 2)))
     both = first.joined(np.ones((3, 1)), np.ones((3, 2)))
-    assert len(first) == len(both) == MEMORY and both.X.sum() == 3.0 and both.residuals.sum() == 6.0
-    assert repr(both) == f"<Samples: {MEMORY} with 2 residuals>"
+    assert len(first) == len(both) == KEPT_SAMPLES and both.X.sum() == 3.0 and both.residuals.sum() == 6.0
+    assert repr(both) == f"<ResidualSamples: {KEPT_SAMPLES} with 2 residuals>"

@@ -1,0 +1,294 @@
+"""Gradient actions: the solves with which a search begins, those of single agents, those of later rounds, and the polish at its end.
+
+This module has all calls of gradient solves from the search. A solve of an agent leads from a point to the front by the scalarisation of
+Pascoletti and Serafini (1984): minimise alpha subject to F - reference <= alpha weights. If the reference is the objectives of the point
+itself, no objective may get worse, wherever the solve begins: such a solve is called guarded. Its result is used only if it is feasible and
+indeed no worse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from transcription.nlp.scalarized import Solved
+from transcription.stopping import stopping
+
+from ..evaluation.bilevel import Bilevel
+from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
+from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_between
+from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, alpha_of, guessed_start
+from ..gradients.polish import BudgetedSolves, PolishLog, polish
+from ..gradients.scalarised import GradientSolves, Scalarised
+from ..pareto.archive import Archive
+from ..pareto.dominance import CURVE, extremes, feasible_and_no_worse, nearest, ranges
+from ..pareto.spread import Guide
+from . import social
+from .settings import Settings
+from .state import NO_DIRECTION, SearchState, update_archives
+from .trials import Gains, give_credit
+
+
+@dataclass(frozen=True)
+class GradientRules:
+    """How many gradient solves a search makes, and from where (measured on the catalogue's problems)."""
+
+    first_points: int = 10  # most points of the front that are found before the search begins
+    unseen: float = 0.1  # probability of another optimum below which there are starts enough to begin with, if all led to one
+    evaluations_per_start: int = 20  # at the beginning, one start may be drawn for so many evaluations
+    other_optimum: float = 1e-3  # part of the ranges by which the result of another start must be worse to be another optimum
+    flat: float = 0.05  # least component of a direction in the weights: a smaller one would leave its objective without control
+    least_polish: int = 60  # solves that a polish may always make if proposals are mostly propagated: solves then find the points
+    polish_per_point: int = 8  # most solves in the polish of a round, for each point that the archive may have
+
+
+GRADIENT_RULES = GradientRules()
+
+
+class Opening:
+    """The points with which a search begins: its first population at Z (k, D) and, with gradients, the ends of the front and points between
+    them.
+
+    Where the search chooses its inner solver, the first population is only propagated, but for what the user gave: gradient solves from as
+    many starts as pay find more for their work. If neither finds anything feasible, the population is projected.
+    """
+
+    def __init__(
+        self, evaluator: Evaluator, Z: np.ndarray, given: int, gradients: bool, points: int, budget: int, rng: np.random.Generator
+    ) -> None:
+        self._evaluator, self._Z, self._given, self._budget, self._rng = evaluator, Z, given, budget, rng
+        self._points = min(points, GRADIENT_RULES.first_points)
+        gradients = gradients and isinstance(evaluator, Bilevel)
+        quick = gradients and bool(evaluator.ways)
+        self.population = evaluator.evaluate(Z, 0) if quick and not given else evaluator.evaluate(Z[:given] if quick else Z)
+        if quick and 0 < given < len(Z):
+            self.population = self.population.joined(evaluator.evaluate(Z[given:], 0))
+        self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
+        self.closest = self.optima
+        self.multimodal, self.unimodal = False, np.zeros(self.population.F.shape[1], dtype=bool)
+        solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
+        if quick and not self._feasible.any() and not self._decided(solver) and evaluator.counts.evaluations < budget:
+            self._project()
+            solver = self._solver()
+        if solver is not None and solver.closest is not None:
+            assert isinstance(evaluator, Bilevel)
+            self.closest = _evaluation([solver.closest], evaluator)
+        elif solver is not None and not stopping():
+            self.optima = self._solved(solver)
+
+    @property
+    def _feasible(self) -> np.ndarray:
+        return self.population.violation <= self._evaluator.tolerance
+
+    def _project(self) -> None:
+        """Make the population feasible by the fixed rule, as far as the budget goes."""
+        found = self._evaluator.evaluate(self._Z[: max(0, self._budget - self._evaluator.counts.evaluations)])
+        rows = np.arange(len(self._Z))
+        rows[: len(found.F)] += len(self._Z)
+        self.population = self.population.joined(found).take(rows)
+        self.evaluations.append(found)
+
+    def _solver(self) -> MultistartSolver | None:
+        """Solver that begins at the best of the vectors that were given; where none were, at the problem's guess, as gradient tools do;
+        without one, at the candidate that misses least. None if that is no number."""
+        assert isinstance(self._evaluator, Bilevel)
+        seen, given = self.population, slice(self._given)
+        known = np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1)
+        violation = np.where(known, seen.violation, np.inf)
+        start = guessed_start(self._evaluator.nlp)
+        if known[given].any():
+            start = self._Z[[np.argmin(violation[given])]]  # as it was given: propagated states may be far from those
+        elif start is None and known.any():
+            start = seen.Z[[np.argmin(violation)]]
+        if start is None:
+            return None
+        count = None if self._evaluator.ways else 1
+        solves, most = _counted_by(self._evaluator), self._budget // GRADIENT_RULES.evaluations_per_start
+        return MultistartSolver(self._evaluator.nlp, start, count, self._rng, solves, GRADIENT_RULES.unseen, most)
+
+    def _decided(self, solver: MultistartSolver | None) -> bool:
+        """Whether a gradient solve for the first objective ends at an optimum, or solves for feasibility find that there is none."""
+        if solver is None:
+            return False
+        task = Scalarised.single(0, len(self._evaluator.goals))
+        with solver.solves.at_most(MULTISTART.iterations):
+            solved = solver.solve(task)
+        return solver.with_feasible_start(solved, task).status == CONVERGED or solver.closest is not None
+
+    def _solved(self, solver: MultistartSolver) -> Evaluation:
+        """The ends of the front, and a compromise of them; where the search chooses its ways, points along the front instead, each from as
+        many starts as pay. Fewer if asked to end early, or where none was found."""
+        found = lexicographic_ends(solver)
+        self.multimodal = any(one.optima() > 1 for one in solver.stopping.values())
+        for i, one in solver.stopping.items():
+            self.unimodal[i] = one.enough and one.optima() == 1
+        if self.unimodal.all():
+            solver.most = 0  # nothing else is expected between the ends, either
+        if 1 < len(found) == sum(one.status == CONVERGED for one in found):
+            F = np.array([one.F for one in found])
+            if self._evaluator.ways:
+                found += solve_tasks(solver, tasks_between(F, ranges(F), max(self._points, len(F) + 1), METHODS[0]))
+            else:
+                found.append(solver.solve(Scalarised(F.min(axis=0), ranges(F))))
+        assert isinstance(self._evaluator, Bilevel)
+        return _feasible_of(found, self._evaluator)
+
+
+def restart_solves(
+    archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, unimodal: np.ndarray, rng: np.random.Generator
+) -> tuple[Evaluation, bool]:
+    """What `count` gradient solves from other starts find, for the ends of the front and points along it in turn; fewer if asked to end
+    early; and whether one of them ended at a worse optimum than is known. Where starts led to several optima for some objectives only,
+    other ends are not sought."""
+    solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, _counted_by(evaluator))
+    m, span = archive.F.shape[1], ranges(archive.F)
+    ends = archive.F[extremes(archive.F)]
+    singles = [Scalarised.single(i, m) for i in range(m) if unimodal.all() or not unimodal[i]]
+    between = tasks_between(ends, np.ptp(ends, axis=0), max(min(points, GRADIENT_RULES.first_points), m + 1), METHODS[0]) if m > 1 else []
+    found, worse = [], False
+    with solver.solves.at_most(MULTISTART.iterations):
+        for k in range(drawn, drawn + count):
+            if stopping():
+                break
+            # Ends are what points between them follow: two starts for these, and one for one of those, in turn.
+            inner = bool(between) and k % 3 == 2
+            turn, which = divmod(k // 3, len(between)) if inner else divmod(k - k // 3 if between else k, len(singles))
+            task = (between if inner else singles)[which]
+            start = Starts(evaluator.nlp, rng, MULTISTART.everywhere + turn + which).draw(solver.nearest(task))[0]
+            found.append(solver.from_vector(start, task))
+            alpha, known = alpha_of(task, found[-1]), solver.merits(task, archive.F, archive.violation).min()
+            worse |= alpha is not None and bool(
+                alpha > known + GRADIENT_RULES.other_optimum * (span / np.where(task.moving, task.weights, np.inf)).max()
+            )
+    return _feasible_of(found, evaluator), worse
+
+
+def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) -> None:
+    """Make the gradient solves from other starts with which a round begins, where the search chooses its inner solver."""
+    rounds = state.rounds
+    if rounds is None or not (settings.refines and evaluator.has_gradients and evaluator.ways and len(state.archive)):
+        return
+    if (count := rounds.due - rounds.restarts) > 0 and isinstance(evaluator, Bilevel):
+        memory = state.gradients
+        solved, worse = restart_solves(state.archive, evaluator, settings.archive, count, rounds.restarts, memory.unimodal, state.rng)
+        memory.multimodal, rounds.restarts = memory.multimodal or worse, rounds.due
+        state.add_optima(Archive.of(solved, solved.status == CONVERGED))
+        update_archives(state, [solved], settings, evaluator)
+
+
+def gradient_actions(state: SearchState, settings: Settings, evaluator: Evaluator, guide: Guide | None) -> None:
+    """Make the gradient solves of agents that are due, if the problem has derivatives."""
+    if not (settings.refines and evaluator.has_gradients):
+        return
+    due = state.evaluations // settings.variant.refine_every - state.gradients.solves
+    for _ in range(due):
+        gains, before = Gains(state, evaluator.tolerance), evaluator.counts.work
+        solved = individual_action(state, evaluator, settings.variant.F, guide)
+        give_credit(state, -1, sum(gains.of(one) for one in solved), evaluator.counts.work - before, len(solved))
+        update_archives(state, solved, settings, evaluator)
+
+
+def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator, guide: Guide | None) -> np.ndarray | None:
+    """Polish the archive, at the end of the search or of a round, unless the round found nothing new. Returns the objectives (k, m) of all
+    that was found; None if the polish was asked to end early: it then continues at the next call."""
+    memory, rounds = state.gradients, state.rounds
+    if memory.polishing is None:
+        if rounds is not None and memory.polished is not None and not rounds.has_improvement(state.archive.F):
+            state.archive = memory.polished
+            return state.archive.F
+        memory.polishing = PolishLog.of(state.archive)
+    log = memory.polishing
+    if rounds is None:
+        least = GRADIENT_RULES.least_polish if evaluator.ways else 0
+        count = max(state.evaluations // settings.polish_every - memory.solves, least)
+    else:
+        count = GRADIENT_RULES.polish_per_point * settings.archive
+    solves = BudgetedSolves(evaluator, count, log, memory.failed_pairs)
+    # A later round is polished if it found something new: not all starts are alike.
+    unimodal = bool(memory.unimodal.all()) and memory.polished is None
+    exponent = settings.variant.energy_exponent
+    state.archive = polish(log.archive, solves, settings.archive, exponent, guide, state.optima, unimodal)
+    if solves.stopped:
+        return None
+    memory.polishing, memory.polished, memory.failed_pairs = None, state.archive, solves.failed_pairs
+    solved = log.take(slice(None))
+    state.add_optima(Archive.of(solved, solved.status == CONVERGED))
+    return np.vstack([log.archive.F, solved.F[solves.feasible(solved)], state.archive.F])
+
+
+def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide: Guide | None = None) -> list[Evaluation]:
+    """Make one gradient solve for the agent whose turn it is, along its own direction.
+
+    For a feasible agent the solve is guarded. Its start changes from turn to turn: the position of the agent, that of its nearest neighbour
+    in the archive, or the proposal of a social action. The last two allow the agent to leave its basin of attraction. For an infeasible
+    agent the solve starts at its position and makes it feasible as well.
+
+    In the first turn, an agent whose direction is a single objective minimises that objective alone, without regard to the others: the
+    archive needs the ends of the front to be spread along it. After the first turn the ends are known, and with more than two objectives
+    such an agent gets a random direction. With more than two objectives, all other solves start their line at the ideal point instead of
+    the agent's objectives: a surface is too large to be covered from the positions of the agents alone.
+    """
+    agents, m = state.agents, state.directions.shape[1]
+    turn, i = divmod(state.gradients.solves, len(agents))
+    state.gradients.solves += 1
+    feasible = agents.violation[i] <= evaluator.tolerance
+    if not np.isfinite(agents.F[i]).all():
+        return []
+    start = agents.Z[i].copy()
+    others = np.flatnonzero((agents.F[i] != state.archive.F).any(axis=1) & feasible)
+    if turn % 3 == 1 and others.size:
+        start = state.archive.Z[others[nearest(agents.F[i], state.archive.F[others], ranges_of(state))[0]]]
+    elif turn % 3 == 2 and feasible:
+        box = evaluator.box
+        pool = box.to_unit(state.archive.Z[:, evaluator.free])
+        X = box.to_unit(start[evaluator.free])[None]
+        start[evaluator.free] = box.to_values(social.current_to_rand(box, X, pool, max(len(pool), 4), F, state.rng)[0])
+    direction = np.ones(m) if agents.direction[i] == NO_DIRECTION else state.directions[agents.direction[i]]
+    if m > CURVE and turn and np.count_nonzero(direction) == 1:
+        direction = state.directions[_any_inner(state, guide)]
+    weights = np.where(direction > 0, ranges_of(state) / np.maximum(direction, GRADIENT_RULES.flat), 0.0)
+    alone = turn == 0 and m > 1 and np.count_nonzero(direction) == 1
+    reference = state.ideal if m > CURVE and len(state.archive) >= m and not (weights == 0.0).any() else agents.F[i]
+    reference = np.where(direction > 0, reference, np.inf) if alone else reference
+    found = evaluator.descend(start[None], reference[None], weights[None])
+    if not len(found.F):  # asked to end early
+        return []
+    limit = agents.F[i] if feasible else np.full(m, np.inf)
+    if feasible_and_no_worse(found, limit[None], agents.violation[i : i + 1], ranges_of(state))[0]:
+        agents.place(np.array([i]), found.Z, found.F, found.violation)
+    return [found]
+
+
+def _any_inner(state: SearchState, guide: Guide | None) -> int:
+    """The row of a random direction that is not a single objective."""
+    m, count = state.directions.shape[1], len(state.directions)
+    wanted = social.direction_shares(state, guide)
+    if wanted is None:
+        return int(state.rng.integers(m, count))
+    return int(state.rng.choice(np.arange(m, count), p=wanted[m:] / wanted[m:].sum()))
+
+
+def ranges_of(state: SearchState) -> np.ndarray:
+    """The `ranges` (m,) of the archive, or of the agents while the archive is empty."""
+    return ranges(state.archive.F if len(state.archive) else state.agents.F[np.isfinite(state.agents.F).all(axis=1)])
+
+
+def _counted_by(evaluator: Evaluator) -> GradientSolves:
+    """Gradient solves whose counts are the evaluator's, and before each of which it does what it does before a batch."""
+    solves = GradientSolves(evaluator.tolerance)
+    solves.before, solves.counts = evaluator.before_batch, evaluator.counts
+    return solves
+
+
+def _feasible_of(found: list[Solved], evaluator: Bilevel) -> Evaluation:
+    return _evaluation([one for one in found if one.violation <= evaluator.tolerance], evaluator)
+
+
+def _evaluation(found: list[Solved], evaluator: Bilevel) -> Evaluation:
+    return Evaluation(
+        Z=np.array([one.z for one in found]).reshape(-1, len(evaluator.nlp.variables)),
+        F=np.array([one.F for one in found]).reshape(-1, len(evaluator.goals)),
+        violation=np.array([one.violation for one in found]),
+        status=np.array([one.status for one in found], dtype="<U10"),
+    )
