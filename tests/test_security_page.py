@@ -28,7 +28,7 @@ def test_the_limits_that_it_names_are_those_of_the_code():
     assert found == {
         "fronts": files.LARGEST_FRONT,
         "dialogues": dialogue_file.MOST_BYTES,
-        "checkpoints": checkpoint.LARGEST,
+        "checkpoints": checkpoint.LARGEST_CHECKPOINT,
         "tables": DATA_BYTES,
         "files": catalogue.PROBLEM_FILE_BYTES,
         "preferences": inputs.PREFERENCE_BYTES,

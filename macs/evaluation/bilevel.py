@@ -14,10 +14,8 @@ from transcription.smooth import Smooth
 
 from .evaluator import Counts, Evaluation, Evaluator
 
-PATIENCE = 100
+SOLVE_ITERATIONS = 100
 """Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others."""
-INSIDE = 2
-"""A solve that is to keep away from limits may take so many times as many: its start is outside of them, and no other stands in for it."""
 
 
 class Bilevel(Evaluator):
@@ -93,7 +91,7 @@ class Bilevel(Evaluator):
                 weights=weight,
                 margin=margin,
                 tolerance=self.tolerance,
-                max_iterations=PATIENCE if margin is None else INSIDE * PATIENCE,
+                max_iterations=SOLVE_ITERATIONS if margin is None else 2 * SOLVE_ITERATIONS,
                 persistent=False,
             )
             if not solved.begun:

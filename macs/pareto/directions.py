@@ -68,12 +68,8 @@ def best_points(F: np.ndarray, directions: np.ndarray, ideal: np.ndarray, nadir:
     return tchebycheff(F[:, None], directions, ideal, nadir).argmin(axis=0)
 
 
-DEFAULT = 100
+LATTICE_SIZE = 100
 """Default: the finest lattice with at most so many directions: 100 for two objectives and 91 for three, as usual."""
-
-
-FINER = 4
-"""If no lattice has the number of directions that is wanted, they are chosen from a lattice with up to so many times as many."""
 
 
 def lattice_size(m: int, divisions: int) -> int:
@@ -97,11 +93,11 @@ def reference_directions(m: int, population: int | None, divisions: int | None) 
 @lru_cache(maxsize=32)
 def _lattice(m: int, population: int | None, divisions: int | None) -> np.ndarray:
     if divisions is not None or population is None:
-        return simplex_lattice(m, divisions_below(m, DEFAULT) if divisions is None else divisions)
+        return simplex_lattice(m, divisions_below(m, LATTICE_SIZE) if divisions is None else divisions)
     divisions = divisions_below(m, population)
     if lattice_size(m, divisions) == population:
         return simplex_lattice(m, divisions)
-    finer = divisions_below(m, FINER * population)
+    finer = divisions_below(m, 4 * population)  # they are chosen from a lattice with up to so many times as many
     # With many objectives, lattices grow by more than that factor from one to the next.
     fine = simplex_lattice(m, finer if lattice_size(m, finer) > population else finer + 1)
     return fine[spread(fine, population, fine.max(axis=1) == 1.0)]
@@ -111,7 +107,7 @@ def population_size(m: int | None, population: int | None, divisions: int | None
     """Number of individuals; None if it depends on the number m of objectives, which is not known."""
     if population is not None:
         return population
-    return None if m is None else lattice_size(m, divisions_below(m, DEFAULT) if divisions is None else divisions)
+    return None if m is None else lattice_size(m, divisions_below(m, LATTICE_SIZE) if divisions is None else divisions)
 
 
 def check_several(name: str, m: int) -> None:

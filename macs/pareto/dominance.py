@@ -16,10 +16,6 @@ CURVE = 2
 `worthwhile`."""
 
 
-CHARGE = 0.01
-"""Part of the other objectives, in ranges, that is added to each by `worthwhile`."""
-
-
 def nondominated(F: np.ndarray) -> np.ndarray:
     """Mask (n,) of the non-dominated rows of F (n, m). Of equal rows only the first is kept; a row with NaN never is."""
     keep = np.isfinite(F).all(axis=1)
@@ -42,12 +38,12 @@ def worthwhile(F: np.ndarray) -> np.ndarray:
     """Mask (n,) of the non-dominated rows of F (n, m) that are not far worse than another for a little of one objective, and of the best of
     each objective.
 
-    Each objective is charged the part `CHARGE` of the others, in ranges; points that are then dominated are left out (Ikeda, Kita and
+    Each objective is charged a hundredth of the others, in ranges; points that are then dominated are left out (Ikeda, Kita and
     Kobayashi 2001). With more than two objectives such points are often far from the front, and others rarely dominate them.
     """
     span = np.ptp(F, axis=0)
     N = np.where(span > 0.0, F / np.where(span > 0.0, span, 1.0), 0.0)
-    keep = nondominated((1.0 - CHARGE) * N + CHARGE * N.sum(axis=1, keepdims=True))
+    keep = nondominated((1.0 - 0.01) * N + 0.01 * N.sum(axis=1, keepdims=True))
     keep[extremes(F)] = True
     return keep
 
@@ -78,8 +74,6 @@ BETTER = 1e-6
 """An objective that is lower by this part of its range is clearly better."""
 CONSTANT = 1e-6
 """An objective that varies less, as a fraction of its size, is judged by its size."""
-OPTIMISM = 10.0
-"""A point that is feasible only within the tolerance may have objectives that are too low by so many times its violation."""
 
 
 def feasible_and_no_worse(found: Evaluation, F: np.ndarray, violation: np.ndarray, ranges: np.ndarray) -> np.ndarray:
@@ -90,7 +84,7 @@ def feasible_and_no_worse(found: Evaluation, F: np.ndarray, violation: np.ndarra
 
 def slack(violation: np.ndarray) -> np.ndarray:
     """Fractions (k,) of the ranges by which an optimum may be worse than points with this violation (k,) and still count as no worse."""
-    return SAME + OPTIMISM * violation
+    return SAME + 10.0 * violation
 
 
 def ranges(F: np.ndarray) -> np.ndarray:

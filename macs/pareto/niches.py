@@ -15,10 +15,6 @@ MANY = 3
 """With more than so many objectives, points compete along directions."""
 PENALTY = 3.0
 """Weight of the distance from a direction, relative to the distance along it (Zhang and Li 2007)."""
-TIE = 1e-6
-"""Values of an objective that differ from the best by less than this part of the range are as good as the best."""
-ALONG = 1e-6
-"""Weight of the objective whose axis a corner is to be near, relative to the others."""
 
 
 def best_of_niches(F: np.ndarray, limit: int) -> np.ndarray:
@@ -53,23 +49,25 @@ def intercepts(F: np.ndarray) -> np.ndarray:
     span = N.max(axis=0)
     span[span == 0.0] = 1.0
     N /= span
-    weights = np.where(np.eye(F.shape[1], dtype=bool), ALONG, 1.0)
+    # A corner is the point nearest to an axis: the objective of the axis hardly counts.
+    weights = np.where(np.eye(F.shape[1], dtype=bool), 1e-6, 1.0)
     corners = N[(N[:, None] * weights).max(axis=2).argmin(axis=0)]
     with np.errstate(divide="ignore", over="ignore"):
         try:
             cut = 1.0 / np.linalg.solve(corners, np.ones(len(span)))
         except np.linalg.LinAlgError:
             return span
-    if not (cut > ALONG).all():
+    if not (cut > 1e-6).all():
         return span
     return span * np.minimum(cut, 1.0)
 
 
 def nearly_best(F: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """Rows (m,) of the best point of each objective of F (n, m); of those that tie, see `TIE`, the one with the least `total` (n,)."""
+    """Rows (m,) of the best point of each objective of F (n, m); of those whose values differ from the best by less
+    than a millionth of the range, the one with the least `total` (n,)."""
     span = np.ptp(F, axis=0)
     away = (F - F.min(axis=0)) / np.where(span > 0.0, span, 1.0)
-    return np.array([np.lexsort((total, np.maximum(column, TIE)))[0] for column in away.T], dtype=int)
+    return np.array([np.lexsort((total, np.maximum(column, 1e-6)))[0] for column in away.T], dtype=int)
 
 
 def _unit_directions(m: int, count: int) -> np.ndarray:

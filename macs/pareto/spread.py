@@ -14,11 +14,6 @@ import numpy as np
 
 from .dominance import extremes
 
-HUGE = 1e9
-"""Largest energy of a pair, in units of the energy of neighbours."""
-ANCHORED = 0.5
-"""Part of the places that points may have which a guide wants kept."""
-
 
 class Guide(Protocol):
     """How densely points are wanted along a front. Objectives are minimised; only points of the front at hand are known."""
@@ -56,7 +51,8 @@ def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | Non
     if factors is not None:
         squared *= factors[:, None] * factors
     unit = (count or len(F)) ** (-2.0 / max(varying.size - 1, 1))
-    energies = (unit / np.maximum(squared, unit * HUGE ** (-2.0 / s))) ** (s / 2.0)
+    # Coinciding points have 1e9 times the energy of neighbours: a larger one would hide others in rounding errors.
+    energies = (unit / np.maximum(squared, unit * 1e9 ** (-2.0 / s))) ** (s / 2.0)
     np.fill_diagonal(energies, 0.0)
     return energies
 
@@ -72,7 +68,7 @@ def spread(
     """
     fixed = best_of_each(F, limit)
     for row in [] if guide is None else guide.anchors(F):
-        if np.count_nonzero(fixed) < ANCHORED * limit:
+        if np.count_nonzero(fixed) < 0.5 * limit:  # a guide may keep half of the places
             fixed[row] = True
     energies = pair_energies(F, exponent, limit, None if guide is None else guide.factors(F, F))
     return of_low_energy(energies, limit, fixed, members)
@@ -123,8 +119,6 @@ def _exchange(inside: np.ndarray, fixed: np.ndarray, energy: np.ndarray, energie
 
 CORNER = 1.1
 """Corner of the dominated volume in each objective, in ranges of the front from its ideal point."""
-BETTER = 1.0 + 1e-9
-"""Factor by which a point must be worth more than another to take its place."""
 
 
 def dominated_volume(N: np.ndarray) -> float:
@@ -154,7 +148,7 @@ def duels(F: np.ndarray, chosen: np.ndarray, fixed: np.ndarray, energies: np.nda
         inside[place] = N[other]
         larger = dominated_volume(inside)
         worth = max(larger - volume + added[place], 0.0) ** exponent * energy[held]
-        if worth > BETTER * added[place] ** exponent * (energy[other] - energies[other, held]):
+        if worth > (1.0 + 1e-9) * added[place] ** exponent * (energy[other] - energies[other, held]):
             rows[place], volume = other, larger
             energy += energies[:, other] - energies[:, held]
             added = moocore.hv_contributions(inside, ref=corner)

@@ -18,14 +18,14 @@ from ..preferences.preference import Preference
 from ..preferences.ranges import Ranges
 from ..preferences.stage import Stage
 
-PART = 0.05
+REGION_PART = 0.05
 """The value of a preference in the region of interest differs from the best value on a front by at most this part of the spread of values
 there."""
 
 
 @dataclass(frozen=True)
 class Region:
-    """Region of interest of a preference on a front: where its value is at most `PART` of the spread of its values worse than the best.
+    """Region of interest of a preference on a front: where its value is worse than the best by at most `REGION_PART` of the spread.
 
     The value is that of the first stage, see `Ranking.values`, and the spread is over the points that meet the preference's hard limits:
     those that exceed one lie outside. If all do, the value is by how much.
@@ -52,18 +52,11 @@ class Region:
 
     def contains(self, objectives: np.ndarray) -> np.ndarray:
         """Mask (n,) of the objectives (n, m) that lie in the region."""
-        return self.away(objectives) <= PART
+        return self.away(objectives) <= REGION_PART
 
 
-OUTSIDE = 0.005
+OUTSIDE_DENSITY = 0.005
 """Factor of distances far from the region of interest, relative to that inside: neighbours are farther apart by its inverse."""
-FADING = 0.1
-"""At its border, the factor falls to 1 / e where the value is worse by this part of the width of the region."""
-WITHIN = 10.0
-"""On a surface, so many points are thought of inside the region: they are wanted away from its border by the distance of as many
-neighbours. A point covers what is around it, of which much lies outside where it is on the border."""
-FARTHER = 0.1
-"""The worst value of an objective is kept if it is worse than at all ends of the front by this part of the range."""
 
 
 @dataclass(frozen=True)
@@ -85,14 +78,18 @@ class PreferenceGuide:
         except ValueError:  # names and senses were checked before the search: what is left are values beyond the ranges at hand
             return np.ones(len(points))
         m = front.shape[1]
-        border = 1.0 if m <= CURVE else 1.0 - WITHIN ** (-1.0 / (m - 1))
-        beyond = np.maximum(region.away(points * self._signs) / PART - border, 0.0)
-        return np.maximum(np.exp(-beyond / FADING), OUTSIDE)
+        # A point covers what is around it, much of which lies outside where it is on the border. So, on a surface, points are wanted away
+        # from the border by the distance of neighbours, with ten points thought of inside the region.
+        border = 1.0 if m <= CURVE else 1.0 - 10.0 ** (-1.0 / (m - 1))
+        beyond = np.maximum(region.away(points * self._signs) / REGION_PART - border, 0.0)
+        # To 1 / e where the value is worse by a tenth of the width of the region.
+        return np.maximum(np.exp(-beyond / 0.1), OUTSIDE_DENSITY)
 
     def anchors(self, front: np.ndarray) -> np.ndarray:
         """The row of the best value, then those of worst values of objectives, without which the ranges would be clearly less."""
         short = front.max(axis=0) - front[extremes(front)].max(axis=0)
-        worst = front.argmax(axis=0)[short > FARTHER * ranges(front)]
+        # The worst value of an objective stays if it is worse than at all ends of the front by a tenth of the range.
+        worst = front.argmax(axis=0)[short > 0.1 * ranges(front)]
         try:
             away = self._region(front).away(front * self._signs)
         except ValueError:  # as above

@@ -31,13 +31,12 @@ from ..io.text import document
 from .method import SearchMethod
 from .packing import check_kept, check_shapes, decode, encode
 
-VERSION = 7
+CHECKPOINT_VERSION = 7
 """Of the file format: of the document, and of the states in it."""
 FIRST_LINE = re.compile(rb"MACS checkpoint (\d{1,9}): (\d{1,18}) bytes, sha256 ([0-9a-f]{64})\n")
-LONGEST_LINE = 200
-LARGEST = 2**32
+LARGEST_CHECKPOINT = 2**32
 """Bytes that the document of a file may have."""
-SECONDS, SHARE = 1.0, 20.0
+WRITE_SECONDS, WRITE_SHARE = 1.0, 20.0
 """The time between two writes is at least so many seconds, and at least so many times what the last write took."""
 INSTEAD = "it was left as it is; make the call that it belongs to, name another file, or delete this one"
 HINTS = {
@@ -158,7 +157,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 
     def write_in_time(self) -> None:
         """Write what is not in the file yet, if the last write is long enough ago."""
-        if time.perf_counter() - self._written > max(SECONDS, SHARE * self._took):
+        if time.perf_counter() - self._written > max(WRITE_SECONDS, WRITE_SHARE * self._took):
             self.write()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -231,7 +230,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def sealed(content: bytes, version: int = VERSION) -> bytes:
+def sealed(content: bytes, version: int = CHECKPOINT_VERSION) -> bytes:
     """The content of a file: after a first line with its length and checksum."""
     return f"MACS checkpoint {version}: {len(content)} bytes, sha256 {hashlib.sha256(content).hexdigest()}\n".encode() + content
 
@@ -241,20 +240,20 @@ def read_file(path: str | PathLike[str]) -> bytes:
     if not stat.S_ISREG(Path(path).stat().st_mode):
         raise ValueError("is no ordinary file")  # reading a device or a pipe may never end
     with Path(path).open("rb") as file:
-        line = file.readline(LONGEST_LINE)
+        line = file.readline(200)
         head = FIRST_LINE.fullmatch(line)
         if head is None and line.startswith(b"MACS checkpoint"):
             raise ValueError("is damaged: its first line is not that of a checkpoint")
         if head is None:
             raise ValueError(f"is no checkpoint: {'it is a file of something else, or of an older MACS' if line else 'it is empty'}")
         version, size, checksum = int(head[1]), int(head[2]), head[3].decode()
-        if version != VERSION:
-            raise ValueError(f"is a checkpoint of version {version}; this MACS reads version {VERSION}")
+        if version != CHECKPOINT_VERSION:
+            raise ValueError(f"is a checkpoint of version {version}; this MACS reads version {CHECKPOINT_VERSION}")
         found = Path(path).stat().st_size - len(line)
         if found != size:
             raise ValueError(f"is damaged: it should have {size} bytes after its first line, but has {found}")
-        if size > LARGEST:
-            raise ValueError(f"is no valid checkpoint: it has {size} bytes, more than {LARGEST}")
+        if size > LARGEST_CHECKPOINT:
+            raise ValueError(f"is no valid checkpoint: it has {size} bytes, more than {LARGEST_CHECKPOINT}")
         content = file.read(size)
     if hashlib.sha256(content).hexdigest() != checksum:
         raise ValueError("is damaged: its content does not match its checksum")

@@ -19,6 +19,7 @@ from .contract import Bench, Row, save
 from .density import DENSITY
 from .growth import GENERATION, SCALE
 from .inner import INNER, POPULATION
+from .parts import PARTS_BENCH
 from .peers import PEERS
 from .prefer import PREFER
 from .published import METHODS, STANDARD
@@ -32,6 +33,7 @@ BENCHES: dict[str, Bench] = {
     "generation": GENERATION,
     "inner": INNER,
     "methods": METHODS,
+    "parts": PARTS_BENCH,
     "peers": PEERS,
     "population": POPULATION,
     "prefer": PREFER,

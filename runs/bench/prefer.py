@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from macs import MACS, Front, sweep
 from macs.io.console import Steps
 from macs.preferences import Preference, Ranges, ReferencePoint, WeightedSum
-from macs.search.guide import PART, Region
+from macs.search.guide import REGION_PART, Region
 from problems import load
 from problems.cases import goddard
 from problems.compiled import Objective
@@ -94,7 +94,7 @@ def worst_inside(preference: ReferencePoint, goals: Sequence[Objective], front: 
     ranges, region = Ranges.over(goals, front), Region.of(preference, goals, front)
     best, worst = (np.array([values[goal.name] for goal in goals]) for values in (ranges.best, ranges.worst))
     upper, lower = preference.degrees(goals, ranges, np.stack([best, worst]))  # linear
-    least = 1.0 - (region.best + PART * region.spread)
+    least = 1.0 - (region.best + REGION_PART * region.spread)
     return (best + (worst - best) * (upper - least) / (upper - lower)).tolist()
 
 

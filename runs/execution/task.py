@@ -19,7 +19,7 @@ import numpy as np
 
 from macs.fronts.verified import accuracy
 from macs.io.atomic import write_whole
-from macs.search.rounds import PLANNED
+from macs.search.rounds import PLANNED_EVALUATIONS
 from macs.solvers.checkpoint import Unreadable, keeps
 from problems import load
 
@@ -210,7 +210,8 @@ class ArchiveSamples:
     checkpoint, so that a resumed run has its whole history."""
 
     def __init__(self, budget: int | None, report: Report | None = None, path: Path | None = None) -> None:
-        self._step, self._next, self._report, self._told, self._path = max(1, (budget or PLANNED) // 30), 0, report, 0.0, path
+        self._step = max(1, (budget or PLANNED_EVALUATIONS) // 30)
+        self._next, self._report, self._told, self._path = 0, report, 0.0, path
         self.columns: dict[str, list[Any]] = {key: [] for key in History.__annotations__}
         self._before, self._unsaved = _read(path), False
 

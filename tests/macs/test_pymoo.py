@@ -97,7 +97,7 @@ def finished(algorithm: MACS) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
-        ("zdt4", {"agents": 20, "archive": 50, "CR": 0.5, "social": 0.5, "exponent": 4.0}),
+        ("zdt4", {"agents": 20, "archive": 50, "variant": "paper"}),
         ("bnh", {}),
         ("g1", {}),
         ("rosenbrock", {}),

@@ -35,7 +35,7 @@ FORK = multiprocessing.get_context("fork")
 
 def solved(file: Path | None) -> Front:
     """A search with a polish, slow enough to be killed anywhere in it, that keeps itself in a file as often as it can."""
-    checkpoint.SECONDS = checkpoint.SHARE = 0.0
+    checkpoint.WRITE_SECONDS = checkpoint.WRITE_SHARE = 0.0
     pause = None if file is None else (lambda _: time.sleep(0.02))
     solver = MACS(agents=4, archive=6)
     return solver.solve(load("goddard"), DFET(3, 3), evaluations=120, seed=3, checkpoint=file, callback=pause, progress=False)

@@ -5,7 +5,7 @@ import pytest
 from choices import plain_front
 
 from macs.preferences import PhysicalProgramming, ReferencePoint, Smaller
-from macs.search.guide import PART
+from macs.search.guide import REGION_PART
 from problems.compiled import Objective
 from runs.bench.prefer import Interest
 
@@ -21,10 +21,10 @@ def line(n: int = 10_001) -> np.ndarray:
 
 def test_the_region_and_what_is_missing_there():
     interest = Interest.of(EVENLY, GOALS, line())
-    half = 0.5 * PART  # of the values' spread of 1/2, on either side of the middle
+    half = 0.5 * REGION_PART  # of the values' spread of 1/2, on either side of the middle
     assert interest.points[:, 0].min() == pytest.approx(0.5 - half, abs=1e-4)
     assert interest.points[:, 0].max() == pytest.approx(0.5 + half, abs=1e-4)
-    assert interest.part == pytest.approx(PART, rel=1e-2)
+    assert interest.part == pytest.approx(REGION_PART, rel=1e-2)
     # n points, evenly within a straight front, leave a triangle before, between and after each: the part 1 / (n + 1) of the area below it.
     for n in (1, 4):
         a = 0.5 - half + 2 * half * np.arange(1, n + 1) / (n + 1)

@@ -26,7 +26,7 @@ from macs.decisions import (
 )
 from macs.pareto import directions
 from macs.pareto.spread import spread
-from macs.search.guide import OUTSIDE, PART, PreferenceGuide, Region
+from macs.search.guide import OUTSIDE_DENSITY, REGION_PART, PreferenceGuide, Region
 from problems import load
 from problems.cases import goddard
 from problems.compiled import Objective
@@ -74,8 +74,8 @@ def test_points_of_least_energy_are_as_dense_as_a_guide_wants():
 def test_factors_by_the_region():
     guide, F = PreferenceGuide(MIDDLE, GOALS), line(2001)
     factors, inside = guide.factors(F, F), Region.of(MIDDLE, GOALS, F).contains(F)
-    assert inside.mean() == pytest.approx(PART, rel=0.05) and (factors[inside] == 1.0).all()
-    assert (np.diff(factors[:1001]) >= 0).all() and factors[0] == factors[-1] == OUTSIDE
+    assert inside.mean() == pytest.approx(REGION_PART, rel=0.05) and (factors[inside] == 1.0).all()
+    assert (np.diff(factors[:1001]) >= 0).all() and factors[0] == factors[-1] == OUTSIDE_DENSITY
     assert guide.anchors(F).tolist() == [1000], "the worst values are those of the ends, which are kept anyway"
 
 
@@ -89,8 +89,8 @@ def test_on_surfaces_points_are_wanted_away_from_the_border():
     goals, lattice = (*GOALS, Objective("f3")), directions.simplex_lattice(3, 100)
     middle = ReferencePoint(dict.fromkeys(("f1", "f2", "f3"), 0.0), augmentation=0.0)
     factors, away = PreferenceGuide(middle, goals).factors(lattice, lattice), Region.of(middle, goals, lattice).away(lattice)
-    border = PART * (1.0 - 10.0 ** (-1 / 2))
-    assert (factors[away <= border] == 1.0).all() and (factors[(away > 1.2 * border) & (away <= PART)] < 0.6).all()
+    border = REGION_PART * (1.0 - 10.0 ** (-1 / 2))
+    assert (factors[away <= border] == 1.0).all() and (factors[(away > 1.2 * border) & (away <= REGION_PART)] < 0.6).all()
 
 
 def test_shares_of_directions():
@@ -124,7 +124,7 @@ def test_the_front_is_dense_where_the_preference_is_good(prefer, f1):
     assert inside.sum() >= 5 and inside.sum() >= others.sum() + 2
     assert front.F[0, 0] < 0.01 and front.F[-1, 1] < 0.01, "the ends are there"
     assert distance_to_curve(front.objectives[inside], truth).max() < 1e-3
-    assert region.away(front.objectives).min() < 0.3 * PART
+    assert region.away(front.objectives).min() < 0.3 * REGION_PART
     if f1 is not None:
         assert truth[region.away(truth).argmin(), 0] == pytest.approx(f1, abs=1e-3)
         assert prefer.rank(front).best.objectives["f1"] == pytest.approx(f1, abs=5e-3)
@@ -294,7 +294,7 @@ def test_gradients_go_where_the_preference_is_good(flights):
     region = Region.of(FLIGHT, guided.goals, truth)
     inside, others = (region.contains(front.objectives).sum() for front in (guided, even))
     assert inside >= 5 > 2 >= others
-    assert region.away(guided.objectives).min() < 0.2 * PART
+    assert region.away(guided.objectives).min() < 0.2 * REGION_PART
     assert guided.objectives[0, 0] < 1.02 * truth[0, 0] and guided.objectives[-1, 0] > 240.0
 
 

@@ -161,8 +161,8 @@ def test_a_trajectory_problem_goes_on_to_the_same_bits(file, refine) -> None:
 
 
 def test_a_checkpoint_changes_no_bit(file, monkeypatch) -> None:
-    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
-    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    monkeypatch.setattr(checkpoint, "WRITE_SECONDS", 0.0)
+    monkeypatch.setattr(checkpoint, "WRITE_SHARE", 0.0)
     assert_same(minimize(checkpoint=file), uninterrupted())
 
 
@@ -368,7 +368,7 @@ from macs import MACS, MOPSO
 from macs.search.settings import Variant
 from macs.solvers import checkpoint
 
-checkpoint.SECONDS = checkpoint.SHARE = 0.0
+checkpoint.WRITE_SECONDS = checkpoint.WRITE_SHARE = 0.0
 
 def function(X):
     with open("log", "a") as log:
@@ -418,7 +418,7 @@ from macs.solvers import checkpoint
 from problems import load
 from transcription import DFET
 
-checkpoint.SECONDS = checkpoint.SHARE = 0.0
+checkpoint.WRITE_SECONDS = checkpoint.WRITE_SHARE = 0.0
 scalarize = bilevel.scalarize
 
 def logged(*arguments, **more):
@@ -566,8 +566,8 @@ def test_a_folder_without_permission(tmp_path) -> None:
 
 @pytest.mark.slow
 def test_a_full_disk_loses_neither_the_search_nor_the_last_checkpoint(file, monkeypatch, caplog) -> None:
-    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
-    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    monkeypatch.setattr(checkpoint, "WRITE_SECONDS", 0.0)
+    monkeypatch.setattr(checkpoint, "WRITE_SHARE", 0.0)
     write, written = checkpoint.write_whole, []
 
     def full(path, content) -> None:
@@ -588,8 +588,8 @@ def test_a_full_disk_loses_neither_the_search_nor_the_last_checkpoint(file, monk
 
 
 def test_a_disk_that_was_full_for_a_while(file, monkeypatch) -> None:
-    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
-    monkeypatch.setattr(checkpoint, "SHARE", 0.0)
+    monkeypatch.setattr(checkpoint, "WRITE_SECONDS", 0.0)
+    monkeypatch.setattr(checkpoint, "WRITE_SHARE", 0.0)
     write, tried = checkpoint.write_whole, iter(range(10**6))
 
     def full(path, content) -> None:
@@ -605,7 +605,7 @@ def test_a_disk_that_was_full_for_a_while(file, monkeypatch) -> None:
 def test_writes_are_rare(file, monkeypatch) -> None:
     written = []
     monkeypatch.setattr(checkpoint, "write_whole", lambda path, content: (written.append(len(content)), time.sleep(0.02)))
-    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
+    monkeypatch.setattr(checkpoint, "WRITE_SECONDS", 0.0)
     front = minimize(checkpoint=file, f=lambda X: (time.sleep(0.002), function(X))[1], evaluations=800)
     assert 1 < len(written) <= 2 + front.stats["wall_time"] / (20 * 0.02)
 

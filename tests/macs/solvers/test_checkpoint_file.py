@@ -12,7 +12,8 @@ import pytest
 
 from macs import MACS
 from macs.solvers import checkpoint
-from macs.solvers.checkpoint import VERSION, read_file, sealed
+from macs.solvers.checkpoint import CHECKPOINT_VERSION as VERSION
+from macs.solvers.checkpoint import read_file, sealed
 
 
 @pytest.fixture
@@ -82,7 +83,10 @@ def test_damage_is_refused_in_one_line(file, monkeypatch, damage: Callable[[byte
         (b"MACS checkpoint 3: buy milk\n", "is damaged: its first line"),
         (b"MACS checkpoint 2", "is damaged: its first line"),
         (pickle.dumps({"format": "MACS checkpoint"}), "is no checkpoint: it is a file of something else"),
-        (sealed(b"", VERSION + 1), f"is a checkpoint of version {VERSION + 1}; this MACS reads version {VERSION}"),
+        (
+            sealed(b"", VERSION + 1),
+            f"is a checkpoint of version {VERSION + 1}; this MACS reads version {VERSION}",
+        ),
         (sealed(b"abc") + b"d", "is damaged: it should have 3 bytes after its first line, but has 4"),
         (sealed(b"abc")[:-1] + b"d", "is damaged: its content does not match its checksum"),
     ],

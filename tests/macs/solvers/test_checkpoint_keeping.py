@@ -18,7 +18,7 @@ import pytest
 
 from macs.evaluation.evaluator import Counts
 from macs.solvers import checkpoint
-from macs.solvers.checkpoint import SECONDS, SHARE, Checkpoint, RunStatus, Unreadable, keeps
+from macs.solvers.checkpoint import WRITE_SECONDS, WRITE_SHARE, Checkpoint, RunStatus, Unreadable, keeps
 from macs.solvers.packing import encode
 
 
@@ -166,7 +166,7 @@ def test_the_end_of_the_context_writes_what_is_left(path: Path) -> None:
 
 
 def test_writes_are_a_while_apart(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At least `SECONDS`, from the beginning on, and at least `SHARE` times as long as the last write took."""
+    """At least `WRITE_SECONDS`, from the beginning on, and at least `WRITE_SHARE` times as long as the last write took."""
     clock = Clock(monkeypatch)
     write, took = checkpoint.write_whole, 0.01
 
@@ -185,10 +185,10 @@ def test_writes_are_a_while_apart(path: Path, monkeypatch: pytest.MonkeyPatch) -
         return path.exists()
 
     one = made(path)
-    assert not after(0.9 * SECONDS) and after(0.2 * SECONDS)
+    assert not after(0.9 * WRITE_SECONDS) and after(0.2 * WRITE_SECONDS)
     took = 3.0
-    assert not after(0.9 * SECONDS) and after(0.2 * SECONDS)
-    assert not after(0.9 * SHARE * took) and after(0.2 * SHARE * took)
+    assert not after(0.9 * WRITE_SECONDS) and after(0.2 * WRITE_SECONDS)
+    assert not after(0.9 * WRITE_SHARE * took) and after(0.2 * WRITE_SHARE * took)
 
 
 # Disks that are full
