@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..io.text import counted
-from .dominance import CURVE, among, dominates, nondominated, worthwhile
+from .dominance import CURVE, alpha_nondominated, among, dominates, nondominated
 from .niches import MANY, best_of_niches
-from .spread import Guide, best_of_each, duels, of_low_energy, pair_energies, reach, spread
+from .spread import Guide, best_of_each, of_low_energy, pair_energies, reach, spread, swap_by_hypervolume
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,23 +91,25 @@ def outside(
 def _thinned(points: Archive, known: int, limit: int, exponent: float | None = None, guide: Guide | None = None) -> Archive:
     """The non-dominated points, thinned to the limit; the first are `known` already."""
     keep = np.flatnonzero(nondominated(points.F))
-    even = exponent is None and guide is None
-    if len(keep) > limit and even and points.F.shape[1] > CURVE:
-        keep = keep[worthwhile(points.F[keep])]
+    if len(keep) > limit and exponent is None and guide is None and points.F.shape[1] > CURVE:
+        keep = keep[alpha_nondominated(points.F[keep])]
     if len(keep) > limit:
-        F, members = points.F[keep], keep < known
-        if not even:
-            chosen = spread(F, limit, members, exponent, guide)
-        else:
-            chosen = best_of_niches(F, limit) if F.shape[1] > MANY else _even(F, limit, members)
-        keep = keep[chosen]
+        keep = keep[truncate(points.F[keep], limit, keep < known, exponent, guide)]
     return points.take(keep)
 
 
-def _even(F: np.ndarray, limit: int, members: np.ndarray) -> np.ndarray:
-    """Mask (n,) of `limit` of the points F (n, m), evenly spread and near the front; see `energy.spread` for `members`."""
+def truncate(F: np.ndarray, limit: int, members: np.ndarray, exponent: float | None = None, guide: Guide | None = None) -> np.ndarray:
+    """Mask (n,) of `limit` of the non-dominated points F (n, m), of which the `members` (n,) are in the archive already.
+
+    With up to three objectives they have little energy, and each is worth more in volume than the points near it that are left out. With
+    more, they are the best near evenly spread directions. With an exponent, or a guide, energy alone decides.
+    """
+    if exponent is not None or guide is not None:
+        return spread(F, limit, members, exponent, guide)
+    if F.shape[1] > MANY:
+        return best_of_niches(F, limit)
     fixed, energies = best_of_each(F, limit), pair_energies(F, count=limit)
-    return duels(F, of_low_energy(energies, limit, fixed, members), fixed, energies, reach(F, None))
+    return swap_by_hypervolume(F, of_low_energy(energies, limit, fixed, members), fixed, energies, reach(F, None))
 
 
 def least_violated(closest: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray, limit: int = 1) -> Archive:

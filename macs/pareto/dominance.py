@@ -13,7 +13,7 @@ from ..evaluation.evaluator import CONVERGED, Evaluation
 
 CURVE = 2
 """Number of objectives up to which a front is a curve; with more it is a surface, and points far from it can be non-dominated for ever, see
-`worthwhile`."""
+`alpha_nondominated`."""
 
 
 def nondominated(F: np.ndarray) -> np.ndarray:
@@ -34,7 +34,7 @@ def dominates(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     return np.all(A <= B, axis=-1) & np.any(A < B, axis=-1)
 
 
-def worthwhile(F: np.ndarray) -> np.ndarray:
+def alpha_nondominated(F: np.ndarray) -> np.ndarray:
     """Mask (n,) of the non-dominated rows of F (n, m) that are not far worse than another for a little of one objective, and of the best of
     each objective.
 

@@ -126,7 +126,7 @@ def dominated_volume(N: np.ndarray) -> float:
     return float(moocore.hypervolume(np.ascontiguousarray(N), ref=np.full(N.shape[1], CORNER)))
 
 
-def duels(F: np.ndarray, chosen: np.ndarray, fixed: np.ndarray, energies: np.ndarray, exponent: float) -> np.ndarray:
+def swap_by_hypervolume(F: np.ndarray, chosen: np.ndarray, fixed: np.ndarray, energies: np.ndarray, exponent: float) -> np.ndarray:
     """Mask (n,) of as many of the points F (n, m) as are `chosen`: each of the others, in their order, has taken the place of the nearest
     chosen one if it is worth more there.
 

@@ -58,8 +58,8 @@ GENERAL: dict[str, Switch] = {
     "fewer coordinates": variant(adaptive_coordinates=False),
     "breeding": variant(breeding=False),
 }
-VOLUME: dict[str, Switch] = {"volume in the archive": patched(archives, "duels", lambda F, chosen, *rest: chosen)}
-ALPHA: dict[str, Switch] = {"alpha-dominance": patched(archives, "worthwhile", lambda F: np.ones(len(F), dtype=bool))}
+VOLUME: dict[str, Switch] = {"volume in the archive": patched(archives, "swap_by_hypervolume", lambda F, chosen, *rest: chosen)}
+ALPHA: dict[str, Switch] = {"alpha-dominance": patched(archives, "alpha_nondominated", lambda F: np.ones(len(F), dtype=bool))}
 PARTS: dict[str, dict[str, Switch]] = {
     "curves": GENERAL | VOLUME,
     "constraints": {

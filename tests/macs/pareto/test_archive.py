@@ -179,13 +179,6 @@ def test_factors_stretch_distances_by_their_geometric_mean():
     assert stretched[0, 2] == pytest.approx(plain[0, 2])
 
 
-def test_the_least_violated_point_is_the_first_of_those_that_violate_least():
-    closest = Archive(np.array([[1.0]]), np.array([[5.0, 5.0]]), np.array([0.3]))
-    offered = np.array([[2.0], [3.0], [4.0]]), np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])
-    assert least_violated(closest, *offered, np.array([0.4, 0.2, 0.2])).Z.tolist() == [[3.0]]
-    assert least_violated(closest, *offered, np.array([0.4, 0.3, 0.5])).Z.tolist() == [[1.0]]
-
-
 def test_points_outside_are_infeasible_and_neither_dominated_by_the_archive_nor_among_themselves():
     archive = Archive(np.array([[0.0]]), np.array([[2.0, 2.0]]), np.zeros(1))
     known = Archive(np.array([[1.0], [2.0]]), np.array([[1.0, 3.0], [0.5, 5.0]]), np.array([0.1, 9.0]))
@@ -204,18 +197,6 @@ def test_the_least_violated_points_differ_and_only_the_first_may_have_failed():
     assert least_violated(closest, Z, F, np.array([0.4, 0.3, 0.2]), 2).Z.tolist() == [[4.0], [1.0]]
     assert least_violated(closest, Z, F, np.array([np.inf, 0.3, np.inf]), 5).Z.tolist() == [[1.0]]
     assert least_violated(closest.take([]), Z, F, np.full(3, np.inf), 5).Z.tolist() == [[2.0]]
-
-
-def test_what_an_archive_keeps_has_less_energy_by_the_exponent_that_is_given():
-    """Than what it keeps for another exponent."""
-    points = np.abs(np.random.default_rng(0).standard_normal((60, 3)))
-    F, kept = 1.0 - points / np.linalg.norm(points, axis=1, keepdims=True), {}
-    for exponent in (1.0, 16.0):
-        found = insert(empty(3), np.arange(60.0)[:, None], F, np.zeros(60), limit=20, tolerance=0.0, exponent=exponent)
-        kept[exponent] = found.Z[:, 0].astype(int)
-    for own, other in ((1.0, 16.0), (16.0, 1.0)):
-        energies = pair_energies(F, own)
-        assert energies[np.ix_(kept[own], kept[own])].sum() < energies[np.ix_(kept[other], kept[other])].sum()
 
 
 @settings(max_examples=30)

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs.pareto.dominance import constrained_dominates, dominates, extremes, nondominated, worthwhile
+from macs.pareto.dominance import alpha_nondominated, constrained_dominates, dominates, extremes, nondominated
 
 FRONTS = st.integers(1, 4).flatmap(
     lambda m: arrays(float, st.tuples(st.integers(1, 15), st.just(m)), elements=st.integers(0, 4).map(float))
@@ -71,10 +71,10 @@ def test_points_far_worse_for_a_little_of_one_objective_are_left_out_but_not_the
     least = F[:, 0].min()
     far = np.vstack([F, [least - 1e-4, 5.0, 5.0], [least - 2e-4, 5.1, 5.1]])
     assert nondominated(far).all()
-    assert worthwhile(F).all()
-    assert worthwhile(far).tolist() == [True] * 6 + [False, True]
+    assert alpha_nondominated(F).all()
+    assert alpha_nondominated(far).tolist() == [True] * 6 + [False, True]
 
 
 def test_an_objective_that_is_the_same_at_all_points_charges_nothing():
     F = np.array([[0.0, 1.0], [0.5, 0.4], [1.0, 0.0], [0.9, 0.39]])
-    assert worthwhile(np.column_stack([F, np.full(4, 1e20)])).tolist() == worthwhile(F).tolist()
+    assert alpha_nondominated(np.column_stack([F, np.full(4, 1e20)])).tolist() == alpha_nondominated(F).tolist()

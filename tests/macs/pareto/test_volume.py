@@ -5,12 +5,12 @@ from hypothesis import strategies as st
 
 from macs.pareto.archive import Archive, insert
 from macs.pareto.dominance import extremes, nondominated
-from macs.pareto.spread import CORNER, dominated_volume, duels, pair_energies, reach, spread
+from macs.pareto.spread import CORNER, dominated_volume, pair_energies, reach, spread, swap_by_hypervolume
 
 
 def fought(F, chosen, fixed=()):
     stays = np.isin(np.arange(len(F)), fixed)
-    return duels(F, chosen, stays, pair_energies(F, count=int(chosen.sum())), reach(F, None))
+    return swap_by_hypervolume(F, chosen, stays, pair_energies(F, count=int(chosen.sum())), reach(F, None))
 
 
 def behind_a_surface(rng, count, m, depth):
@@ -92,7 +92,7 @@ def test_the_archive_is_nearer_to_the_front_than_that_of_energy_alone(m, power, 
 
 
 def fought_by_definition(F, chosen, fixed):
-    """The same duels, with all volumes and distances computed anew for each."""
+    """The same swap_by_hypervolume, with all volumes and distances computed anew for each."""
     N = (F - F.min(axis=0)) / np.ptp(F, axis=0)
     power, inside = {2: 2.0, 3: 8.0}[F.shape[1]], chosen.copy()
 

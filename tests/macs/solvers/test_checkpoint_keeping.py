@@ -154,17 +154,6 @@ def test_a_state_is_kept_as_it_was_when_it_was_noted(path: Path) -> None:
 # When it is written
 
 
-def test_the_end_of_the_context_writes_what_is_left(path: Path) -> None:
-    with made(path) as one:
-        assert not path.exists()
-        one.keep(state(), kept())
-    assert made(path).read(3) is not None
-    path.unlink()
-    with one:  # of which nothing is left
-        pass
-    assert not path.exists()
-
-
 def test_writes_are_a_while_apart(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """At least `WRITE_SECONDS`, from the beginning on, and at least `WRITE_SHARE` times as long as the last write took."""
     clock = Clock(monkeypatch)
@@ -267,18 +256,6 @@ def test_another_run_is_refused_with_what_differs_and_what_to_do(path: Path, bel
         made(path, belongs).read(3)
     assert str(caught.value).startswith(f"'{path}' belongs to another run: {words}")
     assert str(caught.value).endswith("make the call that it belongs to, name another file, or delete this one")
-
-
-@pytest.mark.parametrize("size", [60, 61, 200])
-def test_long_values_are_cut_to_sixty_characters(path: Path, size: int) -> None:
-    """With their quotes, and with dots where something is left out."""
-    word = "".join(str(i % 10) for i in range(size - 2))
-    written(path, belongs={"word": word})
-    with pytest.raises(Unreadable) as caught:
-        made(path, {"word": 1}).read(3)
-    shown = str(caught.value).partition("word is ")[2].partition(" there")[0]
-    assert len(shown) == min(size, 60)
-    assert shown == f"'{word}'" if size <= 60 else shown[:-3] == f"'{word}"[:57] and shown.endswith("...")
 
 
 # Files that were forged

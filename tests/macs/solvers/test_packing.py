@@ -158,7 +158,7 @@ LEAF: dict[str, Any] = {"array": np.zeros(2), "number": 1.0, "whole": 1, "flag":
         (Leaf(**LEAF | {"whole": 1.5}), "Expected `int`, got `float` - at `[$].whole`"),
         (Leaf(**LEAF | {"whole": True}), "Expected `int`, got `bool`"),
         (Leaf(**LEAF | {"flag": 1}), "Expected `bool`, got `int`"),
-        (Leaf(**LEAF | {"word": None}), "Expected `str`, got `null`"),
+        (Leaf(**LEAF | {"word": None}), "Expected `str`, got `(null|None)`"),
         (Loose(np.random.Generator(Own(1))), "a generator draws from Own; only PCG64"),
         (Loose(object()), "object cannot be kept"),
     ],
