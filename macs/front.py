@@ -21,8 +21,8 @@ from .fronts.tables import front_html, front_table, headline
 from .fronts.verified import VERIFY, simulated, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
+from .refinement.front_refinement import refine_mesh
 from .refinement.mending import mended
-from .refinement.mesh_refinement import refine_mesh
 
 if TYPE_CHECKING:
     import xarray

@@ -18,9 +18,7 @@ from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from problems.sampling import refuse_peaks
-from transcription import DFET
 from transcription.base import Transcription, check_freedom, check_problem
-from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.derivatives import refuse_dense
 from transcription.nlp.program import nlp_scales
@@ -39,15 +37,11 @@ from .gradients.multistart import MultistartSolver, MultistartStopping
 from .gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
 from .io.console import working
 from .pareto.dominance import BETTER, distinct
-from .refinement.found_optimum import COARSE, found_optimum
-from .refinement.guessed_mesh import guessed_elements
 from .refinement.mending import mended, solved_again
 from .refinement.mesh_loop import MeshLoop, Programs
-from .refinement.search_mesh import default_transcription, search_transcription
+from .refinement.mesh_search import SEARCH, MeshSearch, coarse_meshes, search_meshes
 from .solvers.start import beginning, check_run
 
-PART, MESHES = 0.1, 8
-"""What an optimum is to miss on a mesh that is found, as a fraction of what it may; most meshes of it."""
 AUTO = "auto"
 """As many starts as pay."""
 
@@ -230,16 +224,6 @@ def sweep(
     return job.run(lambda: job.swept(points, method), mended)
 
 
-def meshes_to_begin_on(problem: Problem | CompiledProblem, compiled: CompiledProblem) -> list[Meshed]:
-    """Meshes from which one that suits an optimum is found, in the order in which they are tried."""
-    own = default_transcription(problem)
-    coarse = [own, *COARSE] if isinstance(own, Meshed) else list(COARSE)
-    elements = guessed_elements(compiled)
-    if elements > coarse[0].elements:
-        coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
-    return coarse
-
-
 def check_starts(name: str, starts: int | str) -> None:
     """Raise ValueError unless it is a number of starts or "auto"."""
     if isinstance(starts, str) and starts != AUTO:
@@ -323,9 +307,10 @@ class _Job:
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             try:
                 if not self.fixed:
-                    chosen = search_transcription(self._statement, self.problem, verify or VERIFY, self.solves.tolerance)
+                    given = partial(beginning, self._terms.start)
+                    chosen = search_meshes(self._statement, verify or VERIFY, self.solves.tolerance, show, given, self._terms.count)
                     self.solves.counts = chosen.counts
-                    self.begin(chosen.fine or chosen.search, chosen.ends, chosen.stopping)
+                    self.begin(chosen.fine or chosen.search, chosen.ends, chosen.rules)
                 front = work()
             except Stopped as reason:
                 self._stopped = str(reason)
@@ -342,29 +327,30 @@ class _Job:
         if self.fixed:
             return self.run(lambda: self.front([self.solver.single(i)], None), solved_again)
         terms, verify = self._terms, self._terms.verify
-        limits = PART * (verify or VERIFY)
-        coarse = meshes_to_begin_on(self._statement, self.problem)
+        limits = SEARCH.optimum * (verify or VERIFY)
         with working(terms.time_limit, terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
-            loop = MeshLoop(Programs(self.problem), self.solves, wanted, MESHES, WORK.most)
+            loop = MeshLoop(Programs(self.problem), self.solves, wanted, SEARCH.meshes, WORK.most)
+            search = MeshSearch(loop, [task], partial(beginning, terms.start), terms.count, self._rng)
             try:
-                found = found_optimum(loop, task, partial(beginning, terms.start), terms.count, self._rng, coarse)
+                search.go(coarse_meshes(self._statement))
             except Stopped as reason:
                 words = f"{self._about['name']}: {reason} before the first solve"
                 raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
+            found = search.best(0)
             self._stopped = interrupts.reason
             points = from_vectors(
-                found.nlp,
+                found.program,
                 found.z[None],
                 self._about,
-                self._stats() | {"starts": found.starts, "optima": found.optima, "found": found.times},
+                self._stats() | {"starts": found.rule.converged, "optima": found.optima, "found": found.hits},
                 status=[found.status],
                 notes=[found.note],
-                **certified(found.nlp, found.z[None], None, self._sole),
+                **certified(found.program, found.z[None], None, self._sole),
             )
             if found.status == INFEASIBLE:
-                points = points.replace(notes=[f"{found.note}; {conflict(found.nlp, points[0])}"])
+                points = points.replace(notes=[f"{found.note}; {conflict(found.program, points[0])}"])
             return Front.of(points).verify(verify)
 
     def swept(self, points: int, method: str) -> Front:

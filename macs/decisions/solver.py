@@ -24,7 +24,7 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import MISSES, VERIFY, objective_scales, verified
-from ..gradient_tools import AUTO, Terms, meshes_to_begin_on, payoff
+from ..gradient_tools import AUTO, Terms, payoff
 from ..gradients.front_polish import KEPT_INSIDE
 from ..gradients.scalarised import GradientSolves
 from ..io.console import working
@@ -32,6 +32,7 @@ from ..preferences import Preference, Ranges, Stage
 from ..preferences.preference import BEYOND, CONFIRMED, keeps_limits, standing, within_limits
 from ..preferences.ranges import shown
 from ..preferences.stage import LIMIT_TOL, conflict_message, exceeded, excess_stage, ordering, with_all_limits
+from ..refinement.mesh_search import coarse_meshes
 from ..solvers.start import beginning
 from .choice import Choice, Step
 from .stages import ONLY_NEAR, SAME_VALUE, StageBound, StageSolution, StageSolver, StartVectors
@@ -341,7 +342,7 @@ class DecisionSolver:
             return [self._transcription]
         own = [from_dict(point.transcription) for point in candidates[:1] if point.transcription is not None]
         first = own if begun is None else [begun.nlp.transcription]
-        usual = meshes_to_begin_on(self._statement, self.problem)
+        usual = coarse_meshes(self._statement)
         return list(dict.fromkeys([*(method for method in first if isinstance(method, Meshed)), *usual]))
 
     def _count(self, known: StartVectors, candidates: Sequence[Point]) -> int:

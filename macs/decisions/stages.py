@@ -21,14 +21,13 @@ from ..fronts.builders import certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import costs
 from ..fronts.verified import unmarked
-from ..gradient_tools import MESHES, PART
 from ..gradients.multistart import MultistartSolver
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..preferences import Stage
 from ..preferences.stage import no_limits
-from ..refinement.found_optimum import found_optimum
 from ..refinement.mending import solved_again
 from ..refinement.mesh_loop import MeshLoop, Programs
+from ..refinement.mesh_search import SEARCH, MeshSearch
 
 MINIMUM = Scalarised.single(0, 1)
 """Of a problem with one objective, which is minimised."""
@@ -110,12 +109,12 @@ class StageSolver:
     ) -> StageSolution:
         """The optimum on a mesh that is found for it, from the first of these `meshes` on, where all starts are solved; the next is tried
         where that leads nowhere. `known_on` has the vectors to begin at on each."""
-        limits = PART * verify
+        limits = SEARCH.optimum * verify
         wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
         for widened in range(WIDENINGS + 1):
             known = known_on(meshes[0])
             derived = self._derived(stage, (), known)
-            loop = MeshLoop(Programs(derived.problem), self.solves, wanted, MESHES, WORK.most)
+            loop = MeshLoop(Programs(derived.problem), self.solves, wanted, SEARCH.meshes, WORK.most)
             first = loop.programs(meshes[0])
             begun = self._multistart(derived, first, known, starts)
 
@@ -125,10 +124,12 @@ class StageSolver:
                 one = known_on(nlp.transcription)  # type: ignore[arg-type]
                 return derived.lifted(one.nlp.variables, nlp.variables, one.Z, one.F)
 
-            found = found_optimum(loop, MINIMUM, given, 1, self.rng, meshes)
-            own = found.nlp.transcription.transcribe(self.problem)
-            solution = self._solution(stage, True, derived, found.nlp, own, found.z, found.status, found.note)
-            if widened == WIDENINGS or found.status != CONVERGED or not self._widened(derived, found.nlp, found.z):
+            search = MeshSearch(loop, [MINIMUM], given, 1, self.rng)
+            search.go(meshes)
+            found = search.best(0)
+            own = found.program.transcription.transcribe(self.problem)
+            solution = self._solution(stage, True, derived, found.program, own, found.z, found.status, found.note)
+            if widened == WIDENINGS or found.status != CONVERGED or not self._widened(derived, found.program, found.z):
                 break
         return solution
 

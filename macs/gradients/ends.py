@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 
@@ -42,18 +42,17 @@ class EndsLimits:
 ENDS = EndsLimits()
 
 
-def lexicographic_ends(solver: MultistartSolver, singles: Sequence[Solved] = ()) -> list[Solved]:
+def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved] | None = None) -> list[Solved]:
     """The lexicographic optimum of each objective: its least value, then those of the others in their order.
 
-    Each is without a loss in those before, or, where no solve achieves that, with a loss of `EndsLimits.slack`. It begins at the
-    `singles`, the optima of each objective alone, in their order; those that are not given are found first. Each is also sought from the
-    ends of the others: they are found in different valleys.
+    Each is without a loss in those before, or, where no solve achieves that, with a loss of `EndsLimits.slack`. It begins at the optimum of
+    the objective alone, `single(i)`, and is also sought from the ends of the others: they are found in different valleys.
     """
     m = len(solver.nlp.problem.goals)
-    optima, tried = list(singles), dict[tuple[int, int], np.ndarray]()
-    while (i := len(optima)) < m:
+    optima, tried = list[Solved](), dict[tuple[int, int], np.ndarray]()
+    for i in range(m):
         begun = solver.nearest(Scalarised.single(i, m))
-        optima.append(solver.single(i))
+        optima.append((single or solver.single)(i))
         tried |= {(i, k): optima[k].F for k in range(i) if begun is not None and np.array_equal(begun, optima[k].z)}
     ends: list[Solved | None] = [None] * m
     for _ in range(ENDS.rounds):

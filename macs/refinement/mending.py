@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from transcription import from_dict
 from transcription.inner import Propagate
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
+from transcription.stopping import stopping
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED
@@ -18,28 +20,31 @@ from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, verified
 from ..gradients.front_polish import KEPT_INSIDE, back_off
-from ..gradients.scalarised import WORK, GradientSolves
+from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..io.console import working
-from ..pareto.spread import Guide
-from .filling import filled
-from .fine_front import solved_on
+from ..pareto.dominance import extremes
+from ..pareto.spread import Guide, spread
+from .front_refinement import FrontRefinement, solved_on
 from .mesh_loop import OnMesh, Programs
-from .mesh_refinement import FrontRefinement
 
-PART = 0.8
-"""What points are to miss at most, as a fraction of what they may."""
-MESHES = 6
-"""Most meshes of one point."""
-PATIENCE = 150
-"""Most iterations of one solve: from a trajectory nearby most take some tens."""
-SHARE = 0.4
-"""What is spent on solving points again, and on programs for that, as a fraction of what the front cost."""
-LEAST, LITTLE = 100.0, 2e5
-"""What is allowed even where all that was spent already: iterations for each point that is missed, enough for one more mesh; and what takes
-about a second, since a mesh that is coarse for its search is refined to many times its variables."""
-SLIGHTLY, LOSS = 0.1, 5e-3
-"""Excess over limits, in their scales, up to which a point is rather moved inside of them than solved on a finer mesh; what that may cost
-in each objective, in ranges of the front."""
+
+@dataclass(frozen=True)
+class MendingLimits:
+    """What points that a simulation does not confirm may take."""
+
+    part: float = 0.8  # what points are to miss at most, as a fraction of what they may
+    meshes: int = 6  # most of one point
+    patience: int = 150  # most iterations of one solve: from a trajectory nearby most take some tens
+    share: float = 0.4  # work on solving points again, and on programs for that, as a part of what the front cost
+    each: float = 100.0  # iterations for each point that is missed that are allowed even then: enough for one more mesh
+    # Work that is always allowed, about a second, since a mesh that is coarse for its search is refined to many times its variables.
+    least: float = 2e5
+    slightly: float = 0.1  # excess over limits, in their scales, up to which a point is rather moved inside of them
+    loss: float = 5e-3  # what that may cost in each objective, in ranges of the front
+    starts: int = 2  # verified points from which a solve for a further one is tried
+
+
+MENDING = MendingLimits()
 
 
 def mended(
@@ -86,7 +91,7 @@ class _Mending:
         problem = points.compiled()
         self.points, self.verify, self.show = points, verify, show
         # Points are filled up from the first meshes, too, after others were refined.
-        self.programs, self.simulations = Programs(problem, kept=MESHES), Simulations(problem, verify)
+        self.programs, self.simulations = Programs(problem, kept=MENDING.meshes), Simulations(problem, verify)
         self._solves = GradientSolves(float(points.stats["tolerance"]))
         self._work = points.stats.get("work", 0)
 
@@ -111,11 +116,11 @@ class _Mending:
             again = self.marked(solved_on(again, every, fine, self.programs, self.show))
         elif not again.was_simulated.any():
             again = self.points = self.marked(again)
-        again = tried = self._inside(again, _slightly_outside(again, self.verify), LOSS)
+        again = tried = self._inside(again, _slightly_outside(again, self.verify), MENDING.loss)
         again = self._refined(again, self._meshed(again, again.was_simulated & ~again.verified))
         # On a finer mesh, too, a point may exceed limits between nodes, and by less.
-        anew = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
-        again = self._as_before(self._inside(again, anew, LOSS))
+        moved = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
+        again = self._as_before(self._inside(again, moved, MENDING.loss))
         beyond = again.was_simulated & (again.simulated_violation > self.verify) & (again.status == CONVERGED)
         return self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
 
@@ -159,7 +164,7 @@ class _Mending:
         """The points with some of them on finer meshes of their own, as far as the work allows; simulated."""
         if not rows:
             return points
-        limits = PART * self.verify
+        limits = MENDING.part * self.verify
         wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
         scales = objective_scales(points)
 
@@ -167,7 +172,9 @@ class _Mending:
             return largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
 
         most = self._most_work(points, len(rows))
-        job = FrontRefinement(points, wanted, MESHES, rows, most, programs=self.programs, enough=enough, max_iterations=PATIENCE)
+        job = FrontRefinement(
+            points, wanted, MENDING.meshes, rows, most, programs=self.programs, enough=enough, max_iterations=MENDING.patience
+        )
         job.go(self.show)
         if wanted.accuracy <= accuracy(self.verify)[0]:
             for found in job.found.values():
@@ -183,13 +190,13 @@ class _Mending:
             return None
         spent = points.stats.get("work", 0) - self._work + WORK.building * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places]))
-        return max(SHARE * self._work - spent, LEAST * count * size, LITTLE)
+        return max(MENDING.share * self._work - spent, MENDING.each * count * size, MENDING.least)
 
 
 def _slightly_outside(points: Points, verify: float) -> list[int]:
     """The points of which a simulation shows nothing wrong but that they exceed limits, by little: mostly between nodes. On the mesh that
     they have, whose program is there already, a solve costs far less than on any other."""
-    beyond = (points.simulated_violation > verify) & (points.simulated_violation <= SLIGHTLY) & (points.status == CONVERGED)
+    beyond = (points.simulated_violation > verify) & (points.simulated_violation <= MENDING.slightly) & (points.status == CONVERGED)
     off = np.abs(points.simulated_F - points.F) / objective_scales(points)
     return np.flatnonzero(beyond & (points.defect <= verify) & (off <= verify).all(axis=1)).tolist()
 
@@ -213,3 +220,87 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: flo
     if not moved:
         return points
     return Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats, solver=points.solver)
+
+
+def filled(
+    points: Points,
+    size: int,
+    solves: GradientSolves,
+    most_work: float,
+    programs: Programs,
+    simulations: Simulations,
+    guide: Guide | None = None,
+) -> Points:
+    """The points with further verified ones, until `size` of them are verified or the work is done.
+
+    Solves lead first to where points are that are not verified, then to the middle of the widest gaps between verified ones. Each goes from
+    there to the front along the ranges of the objectives (Pascoletti and Serafini 1984) and starts at the nearest verified points, on their
+    meshes. As many of the points that are not verified are left out as the front has too many.
+    """
+    tried = np.empty((0, points.F.shape[1]))
+    while points.verified.any() and _needed(points).sum() < size and solves.counts.work < most_work and not stopping():
+        scales = objective_scales(points)
+        target = _target(points, tried, scales, guide)
+        if target is None:
+            break
+        tried = np.vstack([tried, target])
+        rows = np.flatnonzero(points.verified)
+        near = rows[np.argsort(np.linalg.norm((points.simulated_F[rows] - target) / scales, axis=1), kind="stable")][: MENDING.starts]
+        for row in near:
+            found = _solved(points, int(row), Scalarised(target, scales, units=scales), solves, programs, simulations)
+            if found is not None:
+                joined = Points.concatenate([points, found]).replace(stats=points.stats, solver=points.solver)
+                points = joined[best_rows(joined)]
+                break
+    return points[_within(points, size, guide)]
+
+
+def _within(points: Points, size: int, guide: Guide | None) -> np.ndarray:
+    """Rows (k,) of a front with `size` points, if that is possible without the best of any objective: of verified points those that are
+    well spread, of others as many as there is room for."""
+    good = np.flatnonzero(points.verified)
+    if len(good) > size:
+        return good[spread(points.simulated_F[good], size, guide=guide)]
+    spare = np.flatnonzero(~_needed(points))
+    return np.setdiff1d(np.arange(len(points)), spare[: max(len(points) - size, 0)])
+
+
+def _needed(points: Points) -> np.ndarray:
+    """Mask (n,) of the points that are verified or the best of an objective."""
+    needed = points.verified.copy()
+    needed[extremes(points.F)] = True
+    return needed
+
+
+def _target(points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide | None) -> np.ndarray | None:
+    """Where to go next (m,): to the point that is not verified and nearest to one that is; without any, to the middle of the widest gap
+    between verified points that are neighbours in the first of two objectives. None if all of that was tried."""
+    good, others = points.simulated_F[points.verified], points.F[~points.verified]
+    others = others[[not (row == tried).all(axis=1).any() for row in others]]
+    if len(others):
+        return others[np.argmin(np.linalg.norm((others[:, None] - good) / scales, axis=2).min(axis=1))]
+    if len(points.goals) != 2 or len(good) < 2:
+        return None
+    good = good[np.argsort(good[:, 0], kind="stable")]
+    middles, widths = 0.5 * (good[1:] + good[:-1]), np.linalg.norm(np.diff(good, axis=0) / scales, axis=1)
+    if guide is not None:
+        widths *= guide.factors(good, middles)
+    new = [k for k in np.argsort(-widths, kind="stable").tolist() if not (middles[k] == tried).all(axis=1).any()]
+    return middles[new[0]] if new else None
+
+
+def _solved(
+    points: Points, row: int, task: Scalarised, solves: GradientSolves, programs: Programs, simulations: Simulations
+) -> Points | None:
+    """A verified point of the task from a point, on its mesh; None if there is none."""
+    point = points[row]
+    method = from_dict(point.transcription or {})
+    if not isinstance(method, Meshed):
+        return None
+    nlp = programs(method)
+    solved = task.solve(solves, nlp, point.decision)
+    if solved.status != CONVERGED:
+        return None
+    found = from_vectors(nlp, solved.z[None], points.solver, points.stats)
+    found = verified(found, simulations.tolerance, task.weights, remark=False, simulations=simulations)
+    return found if found.verified[0] else None

@@ -25,34 +25,35 @@ from ..evaluation.evaluator import CONVERGED
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised, Start, best_of
 from ..pareto.dominance import objective_units, stated_scales
 
-KEPT = 3
-"""Number of NLPs that are kept: of the meshes on which the next points are likely to be solved, too."""
-LITTLE = 1e-4
-"""Part of what an objective varies by near a trajectory that counts as one unit of it at least."""
-PATIENCE = 3
-"""Number of meshes without progress after which a point is not refined further."""
-PROGRESS = 0.5
-"""The error falls at least to this fraction where there is progress."""
+
+@dataclass(frozen=True)
+class LoopLimits:
+    """When a point goes on to another mesh, and how it is solved there. Units are of objectives, see `MeshLoop.units`."""
+
+    kept: int = 3  # programs: of the meshes on which the next points are likely to be solved, too
+    little: float = 1e-4  # part of what an objective varies by near a trajectory that counts as one unit of it at least
+    patience: int = 3  # meshes without progress after which a point is not refined further
+    progress: float = 0.5  # the error falls at least to this fraction where there is progress
+    detours: int = 4  # other meshes that are tried for a point where solves fail
+    blunt: float = 1e-3  # change, in units, that objectives may have which a solve determines only by the root of its accuracy
+    # Where no more than this part of what other controls would gain to first order is gained, that says nothing: as on singular arcs.
+    hollow: float = 0.1
+    # If a point gets worse by more than this, in units of what an objective may be off, it is also sought near where it was: a solve on a
+    # finer mesh may take moving edges away from the switches at which they lay.
+    slip: float = 0.1
+    drift: float = 1e-2  # if a point gets worse by more than this, in units, other starts are tried too
+
+
+LOOP = LoopLimits()
 TROUBLES = {"": "its mesh cannot be refined further", CONVERGED: "finer meshes do not help"}
 """Why a point goes to no finer mesh, by the status of its last solve, if there was one."""
-DETOURS = 4
-"""Number of other meshes that are tried for a point where solves fail."""
-BLUNT = 1e-3
-"""Change, in units, that objectives may have which a solve determines only by the root of its accuracy."""
-HOLLOW = 0.1
-"""Where no more than this part of what other controls would gain to first order is gained, that says nothing: as on singular arcs."""
-SLIP = 0.1
-"""If a point gets worse by more than this, in units of what an objective may be off, it is also sought near where it was: a solve on a
-finer mesh may take moving edges away from the switches at which they lay."""
-DRIFT = 1e-2
-"""If a point gets worse by more than this, in units, other starts are tried too."""
 
 
 class Programs:
     """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes. Those that the problem keeps anyway,
     since a search was made on them, are not made again."""
 
-    def __init__(self, problem: CompiledProblem, kept: int = KEPT) -> None:
+    def __init__(self, problem: CompiledProblem, kept: int = LOOP.kept) -> None:
         self.problem, self.built, self._most = problem, 0, kept
         self._kept: dict[Transcription, NLP] = {}
 
@@ -79,6 +80,7 @@ class OnMesh:
     verdict: Verdict
     by_gradients: bool  # true: a local optimum. False: a feasible point, or nothing is known.
     achieved: np.ndarray | None  # (m,): The objectives of its simulation, all minimised, where that is feasible
+    doubt: float = 0.0  # by how much, in units, these may be too low, since constraints are not satisfied exactly
     change: float = np.inf  # largest change of an objective that matters from the mesh before, in units; infinite where there was none
     tried: bool = False  # whether elements were cut where other controls would gain, which changed next to nothing
 
@@ -154,13 +156,13 @@ class MeshLoop:
         limit: int,
         most_work: float | None = None,
         knots: bool = True,
-        enough: Callable[[OnMesh], bool] = lambda point: False,
+        enough: Callable[[OnMesh], bool] | None = None,
         more: bool = True,
     ) -> None:
         self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
         self._knots, self._built, self._enough, self._more = knots, programs.built, enough, more
         self.problem = programs.problem
-        self._differentiable = differentiable(self.problem)
+        self._differentiable, self._stated = differentiable(self.problem), stated_scales(self.problem.goals)
 
     @property
     def ended(self) -> bool:
@@ -176,7 +178,7 @@ class MeshLoop:
     def units(F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
         """What counts as one in each objective (m,), see `objective_units`: at least a little of what it varies by near a vector of the
         NLP, since an objective near zero is not judged by its own size."""
-        return objective_units(F, stated_scales(nlp.problem.goals), LITTLE * objective_variations(nlp, z))
+        return objective_units(F, stated_scales(nlp.problem.goals), LOOP.little * objective_variations(nlp, z))
 
     def on_mesh(
         self,
@@ -194,12 +196,16 @@ class MeshLoop:
         feasible = verdict.simulation.violation <= self.wanted.feasible and verdict.leaving <= max(
             self.wanted.feasible, self.wanted.leaving
         )
-        return OnMesh(method, z, F, trajectory, verdict, by_gradients, achieved if feasible and np.isfinite(achieved).all() else None)
+        doubt, known = verdict.doubt, feasible and np.isfinite(achieved).all()
+        if known and self._stated.any():
+            # What an infeasible trajectory gains does not depend on what a user counts as one.
+            doubt *= max(1.0, float((objective_variations(self.programs(method), z) / units).max()))
+        return OnMesh(method, z, F, trajectory, verdict, by_gradients, achieved if known else None, doubt)
 
     def refine(self, begun: OnMesh, task: Scalarised, others: Sequence[Trajectory] = (), hints: Sequence[Meshed] = ()) -> Refinement:
         """A point on meshes that simulations agree with, as far as the limits allow."""
         found = Refinement(begun)
-        present, history, waiting, detours = begun, [begun.verdict.error], list(hints), DETOURS
+        present, history, waiting, detours = begun, [begun.verdict.error], list(hints), LOOP.detours
         least = _achieved(begun, task)
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
@@ -223,14 +229,14 @@ class MeshLoop:
                 break
             least = min(least, _achieved(reached, task))
             present = reached
-            if self._enough(present):
+            if self._enough is not None and self._enough(present):
                 found.best = present
                 break
             found.best = min((found.best, present), key=lambda one: self._rank(one, task, least))
             history.append(self._rank(present, task, least)[1])
-            if not self._rank(present, task, least)[0]:
+            if self._enough is None and not self._rank(present, task, least)[0]:
                 break
-            if len(history) > PATIENCE and min(history[-PATIENCE:]) > PROGRESS * min(history[:-PATIENCE]):
+            if len(history) > LOOP.patience and min(history[-LOOP.patience :]) > LOOP.progress * min(history[: -LOOP.patience]):
                 found.trouble = TROUBLES[CONVERGED]
                 break
         beyond = task.loss(found.best.F) - least
@@ -286,7 +292,7 @@ class MeshLoop:
         reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients, optimum)
         # On the same mesh nothing can be seen of what that has wrong.
         change = np.inf if method == present.method else _change(present, F, task, self.wanted.settled)
-        tried = present.gaining and change <= HOLLOW * present.verdict.gain
+        tried = present.gaining and change <= LOOP.hollow * present.verdict.gain
         return replace(reached, change=change, tried=tried), solved.status
 
     def _from_starts(
@@ -298,9 +304,9 @@ class MeshLoop:
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
-        slip = min(SLIP * self.wanted.settled, DRIFT)
-        own = [(present.trajectory, near_first, slip), (present.trajectory, not near_first, DRIFT)]
-        attempts = [*own, *((other, False, DRIFT) for other in others)]
+        slip = min(LOOP.slip * self.wanted.settled, LOOP.drift)
+        own = [(present.trajectory, near_first, slip), (present.trajectory, not near_first, LOOP.drift)]
+        attempts = [*own, *((other, False, LOOP.drift) for other in others)]
         starts = (Start(nlp.interpolate(trajectory), near, drift) for trajectory, near, drift in attempts)
         return best_of(task, self.solves, nlp, starts, bound), True
 
@@ -324,13 +330,13 @@ def differentiable(problem: CompiledProblem) -> bool:
 
 def _achieved(point: OnMesh, task: Scalarised) -> float:
     """The loss that the simulation of a point has for certain."""
-    return np.inf if point.achieved is None else task.loss(point.achieved) + point.verdict.doubt
+    return np.inf if point.achieved is None else task.loss(point.achieved) + point.doubt
 
 
 def _change(before: OnMesh, F: np.ndarray, task: Scalarised, settled: float) -> float:
     """The largest change of the objectives that matter, in units, from those on the mesh before, or from those that its simulation
     achieved, whichever is less: what a coarse mesh has wrong is no change of the point. Of objectives that are not `sharp`, a change of
-    `BLUNT` counts as one of `settled`."""
+    `LOOP.blunt` counts as one of `settled`."""
     known = [before.F] if before.achieved is None else [before.F, before.achieved]
-    weights = np.where(task.sharp, 1.0, min(1.0, settled / BLUNT)) / task.units
+    weights = np.where(task.sharp, 1.0, min(1.0, settled / LOOP.blunt)) / task.units
     return min(float((np.abs(F - one) * weights)[task.used].max()) for one in known)

@@ -26,7 +26,7 @@ from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
 from ..pareto.spread import Guide, spread
 from ..refinement.mending import mended
-from ..refinement.search_mesh import Chosen
+from ..refinement.mesh_search import SearchMeshes
 from ..solvers.solver import Solver
 from .breeding import breed_archive
 from .gradient_actions import Opening, begin_round, gradient_actions, polish_archive
@@ -202,7 +202,7 @@ class MACS(Settings, Solver):
         """Whether points are solved on finer meshes than that of the search."""
         return (self.mesh == "mended" and self.refines) or self.mesh == "adaptive"
 
-    def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: Chosen | None = None) -> Front:
+    def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: SearchMeshes | None = None) -> Front:
         """The front, marked by a simulation of its points; polished on another transcription, with refined meshes, or mended, as the
         settings ask for it."""
         guide = None if self.prefer is None else PreferenceGuide(self.prefer, front.goals)

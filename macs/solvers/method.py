@@ -16,7 +16,7 @@ from transcription.base import Transcription
 
 from ..evaluation.evaluator import Evaluator
 from ..front import Front
-from ..refinement.search_mesh import Chosen
+from ..refinement.mesh_search import SearchMeshes
 
 
 class SearchMethod(ABC):
@@ -109,7 +109,7 @@ class SearchMethod(ABC):
         """Whether `finish` solves points on finer meshes, so that a search may go on a coarse one."""
         return False
 
-    def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: Chosen | None = None) -> Front:
+    def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: SearchMeshes | None = None) -> Front:
         """The front, marked by a simulation of its points unless `verify` is None, after further work.
 
         Called if the search was not stopped. Most solvers do no further work. The time limit of the call holds for it, too. `chosen` is

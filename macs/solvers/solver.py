@@ -30,7 +30,7 @@ from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine, numbers_may_blow_up
 from ..io.interrupts import Interrupts
-from ..refinement.search_mesh import search_transcription
+from ..refinement.mesh_search import search_meshes
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
@@ -79,7 +79,7 @@ class Solver(SearchMethod):
         problem : Problem or VectorProblem
             A vector problem takes neither transcription nor inner level; in the end, its points are evaluated again instead of simulated.
         transcription : Transcription, optional
-            Default: the problem's own; if it has none, DFET on a mesh that is found, see `refinement.search_mesh`.
+            Default: the problem's own; if it has none, DFET on a mesh that is found, see `refinement.mesh_search`.
         evaluations : int, optional
             Number of candidates that are sent to the inner level, or of rows that a vector problem evaluates. Default: MACS searches until
             more work no longer changes the front, see Notes; other searches take the problem's own number. MACS ends before where no
@@ -172,7 +172,7 @@ class Solver(SearchMethod):
             try:
                 if transcription is None:
                     with StatusLine(progress) as show:
-                        chosen = search_transcription(problem, compiled, verify or VERIFY, float(tolerance), show)
+                        chosen = search_meshes(problem, verify or VERIFY, float(tolerance), show)
                     earlier = chosen.counts
                     transcription = chosen.search if self.remeshes else chosen.fine or chosen.search
                     start = chosen.ends if start is None and self.remeshes else start

@@ -14,7 +14,7 @@ import numpy as np
 
 from macs.evaluation.blackbox import PymooFunction, is_pymoo, plain_problem
 from macs.io.text import call
-from macs.refinement.search_mesh import default_transcription
+from macs.refinement.mesh_search import default_transcription
 from macs.search.rounds import PLANNED_EVALUATIONS
 from macs.solvers.solver import Solver, solver
 from macs.solvers.start import drawing

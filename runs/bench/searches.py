@@ -14,7 +14,7 @@ from macs import MACS, Front, sweep
 from macs.io.console import Steps
 from macs.pareto.dominance import nondominated
 from macs.pareto.spread import spread
-from macs.refinement.search_mesh import default_transcription
+from macs.refinement.mesh_search import default_transcription
 from problems import Problem, load
 from problems.cases import goddard, landing_site, orbit_rise
 from problems.catalogue import STANDARD

@@ -19,7 +19,7 @@ from macs.fronts.point import Point
 from macs.gradient_tools import payoff
 from macs.io.text import label
 from macs.pareto.spread import spread
-from macs.refinement.search_mesh import default_transcription
+from macs.refinement.mesh_search import default_transcription
 from problems import load
 from transcription import SingleShooting, from_dict, word
 

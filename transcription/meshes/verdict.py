@@ -189,7 +189,8 @@ def judge(
     optimum: OptimumMultipliers | None = None,
 ) -> Verdict:
     """The assessment of a trajectory by an integrator that is far more exact than the tolerance; see `Verdict`. F, units (m,)."""
-    rtol = wanted.accuracy
+    # An objective whose unit is a small part of it has to be simulated more exactly.
+    rtol = max(min(wanted.accuracy, 0.1 * wanted.settled * float((units / np.maximum(np.abs(F), units)).min())), 1e-13)
     scales = {name: state_scales(phase) for name, phase in trajectory.items()}
     # The integrator's absolute tolerance is stated in spans.
     spans = {name: np.array([v.span for v in phase.state_variables]) for name, phase in trajectory.items()}

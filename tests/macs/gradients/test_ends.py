@@ -44,7 +44,7 @@ def test_an_end_lies_in_the_best_valley_that_is_known(monkeypatch, other, small,
     monkeypatch.setattr(ends, "ENDS", replace(ENDS, small=small, soon=soon))
     solver = solver_of_two_valleys()
     (first, place), (second, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, other)
-    end = lexicographic_ends(solver, [first, second])[0]
+    end = lexicographic_ends(solver, [first, second].__getitem__)[0]
     valley = min(np.roots([4, 0, -4, 0.2]).real, key=lambda p: abs(p - other))
     assert end.z[place] == pytest.approx(valley, abs=1e-5)
     assert end.F[0] <= first.F[0] + 1e-12 and end.F[1] == pytest.approx((valley**2 - 1) ** 2 + 0.2 * valley + 1.0, abs=1e-5)
@@ -66,7 +66,7 @@ def test_an_end_is_also_sought_from_those_of_the_others():
     solver = MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
     (poor, place), (other, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, GOOD)
     assert poor.z[place] > 0 > other.z[place], "the one that was found is in the poor valley"
-    end = lexicographic_ends(solver, [poor, other])[0]
+    end = lexicographic_ends(solver, [poor, other].__getitem__)[0]
     assert end.z[place] == pytest.approx(np.roots([4, 0, -4, 0.2]).real.min(), abs=1e-5) and end.F[0] < poor.F[0] - 0.3
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from macs import Front, sweep
 from macs.evaluation.evaluator import CONVERGED
 from macs.gradients.ends import ENDS, moved_along
-from macs.refinement.fine_front import solved_on
+from macs.refinement.front_refinement import solved_on
 from macs.refinement.mesh_loop import Programs
 from problems import Problem
 from transcription import DFET

@@ -11,7 +11,7 @@ from macs.fronts import verified
 from macs.fronts.verified import unmarked
 from macs.gradients.front_polish import KEPT_INSIDE
 from macs.refinement import mending
-from macs.refinement.mesh_refinement import FrontRefinement
+from macs.refinement.front_refinement import FrontRefinement
 from problems import Problem, load
 from transcription import DFET, SingleShooting
 from transcription.meshes.verdict import Wanted

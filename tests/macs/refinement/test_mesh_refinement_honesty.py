@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from dataclasses import replace
 
 import casadi as ca
@@ -13,12 +12,10 @@ from scipy.optimize import brentq
 
 from macs import optimize, sweep
 from macs.gradients.scalarised import GradientSolves, LexicographicEnd, Scalarised
-from macs.refinement.found_optimum import COARSE, found_optimum
-from macs.refinement.mesh_loop import KEPT, MeshLoop, Programs
+from macs.refinement.mesh_loop import MeshLoop, Programs
 from problems import Problem, load
 from problems.cases.standard import published
 from transcription import DFET, parse
-from transcription.base import NLP
 from transcription.meshes.verdict import Wanted
 
 
@@ -197,61 +194,9 @@ def test_a_control_of_low_order_gets_what_a_mixed_constraint_needs():
     assert abs(fine.F[0, 0] - value.value) < 1e-3
 
 
-def searched(problem: Problem, wanted: Wanted, coarse=COARSE, most_work: float | None = None):
-    compiled = problem.compile()
-    loop = MeshLoop(Programs(compiled), GradientSolves(1e-6), wanted, 8, most_work)
-    found = found_optimum(loop, Scalarised.single(0, len(compiled.goals)), lambda nlp: None, 1, np.random.default_rng(0), coarse)
-    return found, loop
-
-
-PLAIN = Wanted(1e-3, 1e-3, 1e-3, 1e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["breakwell", "bryson_denham", "hypersensitive", "linear_tangent", "moon_landing", "catalyst_mixing"])
-def test_a_mesh_is_found(name):
-    value = published(name)[0]
-    found, loop = searched(load(f"standard/{name}"), PLAIN)
-    assert found.good and found.note == ""
-    simulated = found.refinement.best.verdict.simulation.objectives[value.objective]
-    assert value.met(simulated) and loop.solves.counts.gradient_solves <= 12
-
-
 @pytest.mark.slow
 def test_short_pulses_that_a_coarse_mesh_cannot_show_are_found():
     """Twelve switches, of pulses down to 0.06 of 11.9 seconds. Without some of them, simulations and finer meshes of the same kind agree on
     11.54; an independent mesh, of 200 equal elements with constant controls, has 11.4689."""
     point = optimize(random_problem(4), objective="miss")
     assert point.verified and point.note == "" and point.simulated["miss"] < 11.4689
-
-
-@pytest.mark.slow
-def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
-    hopeless = DFET(1, 1, control_order=0)
-    problem = load("standard/bryson_denham")
-    found, _ = searched(problem, PLAIN, (hopeless,))
-    assert not found.good and found.refinement is None
-    found, loop = searched(problem, PLAIN, (hopeless, DFET(8, 3)))
-    assert found.good and loop.solves.counts.failures
-
-
-@pytest.mark.slow
-def test_work_ends_where_it_is_to_end():
-    problem, wanted = layers(1.5, 1.0, 50.0, 50.0), Wanted(1e-6, 1e-6)
-    whole, free = searched(problem, wanted)
-    part, loop = searched(problem, wanted, most_work=0.3 * free.solves.counts.work)
-    assert whole.good and not part.good and ("change" in part.note or "finer mesh" in part.note)
-    assert (
-        loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.counts.work < 0.8 * free.solves.counts.work
-    )
-
-
-@pytest.mark.slow
-def test_programs_of_earlier_meshes_are_not_kept():
-    def alive() -> int:
-        gc.collect()
-        return sum(isinstance(one, NLP) for one in gc.get_objects())
-
-    before = alive()
-    found, _ = searched(layers(1.5, 1.0, 50.0, 50.0), Wanted(1e-6, 1e-6))
-    assert len(found.refinement.meshes) >= KEPT and alive() - before <= KEPT + 1

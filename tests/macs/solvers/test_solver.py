@@ -13,7 +13,7 @@ from compiled_cases import compiled
 
 from macs import MACS, NSGA2, Progress, sweep
 from macs.evaluation.evaluator import Counts
-from macs.refinement.search_mesh import Chosen
+from macs.refinement.mesh_search import SearchMeshes
 from macs.solvers.solver import Solver
 from problems import Problem, load
 from problems.compiled import CompiledProblem
@@ -164,7 +164,7 @@ def test_a_start_of_another_problem_is_refused(monkeypatch) -> None:
     with pytest.raises(ValueError, match="other variables"):
         MACS().solve(compiled("orbit_rise"), MESH, evaluations=30, start=[other.closest or other[0]])
     # Before a mesh is found.
-    monkeypatch.setattr("macs.solvers.solver.search_transcription", lambda *_: pytest.fail("work before the check"))
+    monkeypatch.setattr("macs.solvers.solver.search_meshes", lambda *_: pytest.fail("work before the check"))
     with pytest.raises(ValueError, match="other variables"):
         MACS().solve(load("orbit_rise"), evaluations=30, start=other)
     with pytest.raises(ValueError, match="unknown start 'smoth', did you mean smooth"):
@@ -238,7 +238,7 @@ def test_a_search_goes_on_the_coarse_mesh_where_its_points_are_solved_on_finer_o
         begun.append(transcription)
         raise Stopped("seen")
 
-    monkeypatch.setattr("macs.solvers.solver.search_transcription", lambda *_: Chosen(mesh, fine, Counts()))
+    monkeypatch.setattr("macs.solvers.solver.search_meshes", lambda *_: SearchMeshes(mesh, fine, Counts()))
     monkeypatch.setattr(Solver, "_search_run", record)
     solver.solve(load("goddard"), seed=1)
     assert begun == [mesh if coarse else fine]

@@ -1,18 +1,24 @@
-"""Mesh refinement of a front: each point gets a mesh of its own, fine enough for an independent simulation to confirm it."""
+"""Mesh refinement of a front: its points on meshes of their own, fine enough for simulations to confirm them, or all on one finer mesh.
+
+The ends of the front are solved first, each for the least value of its own objective, then the points between them, from the nearest on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from problems.checks import check_count, check_positive
 from transcription import from_dict
+from transcription.base import NLP
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.optimality import optimality
+from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
@@ -22,35 +28,54 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..gradients.ends import moved_along
-from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised
+from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised, Start, best_of
 from ..io.console import working
 from ..pareto.dominance import extremes
-from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
+from .mesh_loop import LOOP, MeshLoop, OnMesh, Programs, Refinement, differentiable
 
-OPTIMAL = 1e-6
-"""A point with at most this optimality is not solved again on its first mesh."""
-LEAST_TOLERANCE = 1e-10
-"""Smallest tolerance that double precision and the integrator can resolve."""
-STATIONARY = 1e-2
-"""An optimal point whose best objective alone cannot fall faster than this, in units per span of the variables, or that moves by no more
-than this, in units, to the optimum of that objective alone, is an end of the front."""
-NEARBY = 0.5
-"""Of a point that is not known to be optimal: an end is no further away than so many times the distance to the nearest point."""
+
+@dataclass(frozen=True)
+class FrontLimits:
+    """How the points of a front are refined."""
+
+    tolerance: float = 1e-10  # smallest that double precision and the integrator can resolve
+    optimal: float = 1e-6  # a point with at most this optimality is not solved again on its first mesh
+    # An optimal point whose best objective alone cannot fall faster than this, in units per span of the variables, or that moves by no more
+    # than this, in units, to the optimum of that objective alone, is an end of the front.
+    stationary: float = 1e-2
+    nearby: float = 0.5  # of others: an end is no further away than so many times the distance to the nearest point
+    hinted: float = 1e2  # a point with more times the error that it may have begins on the meshes of its nearest neighbour
+    of_end: float = 6.0  # what an end may take of the work that is allowed, in equal shares of it
+    of_one: float = 2.0  # the same for any other point
+    neighbours: int = 2  # points whose trajectories are further starts of one
+    patience: int = 250  # most iterations of a solve on one finer mesh for all: from a trajectory nearby most take some tens
+
+
+FRONT = FrontLimits()
 NOT_BEGUN = "it was not solved on a finer mesh"
 """Note of a point that was still to be refined when the work was to end."""
-HINTED = 1e2
-"""A point whose error is larger than this, in units of what it may be, begins on the meshes of its nearest neighbour."""
-OF_END, OF_ONE = 6.0, 2.0
-"""What an end, and any other point, may take of the work that is allowed, in equal shares of it."""
-NEIGHBOURS = 2
-"""Number of neighbours whose trajectories are further starts of a point."""
+
+
+def front_tasks(
+    F: np.ndarray, ends: Mapping[int, LexicographicEnd], between: Sequence[int], units: np.ndarray, done: Mapping[int, np.ndarray]
+) -> Iterator[tuple[int, Scalarised]]:
+    """Rows of a front F (k, m), and what each is solved for on another mesh: its ends, then those between them from the nearest to what is
+    `done` on, row -> objectives (m,), which the caller fills. Where the ends have moved, the others move along."""
+    yield from ends.items()
+    known = [i for i in ends if i in done]
+    known = known if len(known) == len(units) else []
+    references, weights = moved_along(F[list(between)], F[known], np.array([done[i] for i in known]).reshape(-1, len(units)), units)
+    left = dict(zip(between, references, strict=True))
+    while left:
+        i = min(left, key=lambda j: min((float(np.linalg.norm((F[j] - F[k]) / units)) for k in done), default=0.0))
+        yield i, Scalarised(left.pop(i), weights, units=units)
 
 
 def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool | None, more: bool = True) -> Points:
     """The points on refined meshes; see `Front.refine_mesh`."""
     check_positive("tolerance", tolerance)
-    if tolerance < LEAST_TOLERANCE:
-        raise ValueError(f"tolerance must be at least {LEAST_TOLERANCE:g}, not {tolerance!r}")
+    if tolerance < FRONT.tolerance:
+        raise ValueError(f"tolerance must be at least {FRONT.tolerance:g}, not {tolerance!r}")
     check_count("limit", limit, 1)
     if time_limit is not None:
         check_positive("time_limit", time_limit)
@@ -81,7 +106,7 @@ class FrontRefinement:
         most_work: float | None = None,
         knots: bool = True,
         programs: Programs | None = None,
-        enough: Callable[[OnMesh], bool] = lambda point: False,
+        enough: Callable[[OnMesh], bool] | None = None,
         max_iterations: int = MOST_ITERATIONS,
         more: bool = True,
     ) -> None:
@@ -108,18 +133,14 @@ class FrontRefinement:
         nlp = self.loop.programs(self.methods[first])
         self.units = self.loop.units(self.front.F[self.good], nlp, self.front[first].decision)
         ends = self._ends()
-        for k, (i, task) in enumerate(ends.items()):
+        between, found = [i for i in self.chosen if i not in ends], dict[int, np.ndarray]()
+        for i, task in front_tasks(self.front.F, ends, between, self.units, found):
             if self.loop.ended:
                 return
-            show(f"meshes of the front: end {k + 1} of {len(ends)}")
+            what = f"end {len(found) + 1} of {len(ends)}" if i in ends else f"point {len(found) + 1} of {len(self.chosen)}"
+            show(f"meshes of the front: {what}")
             self._refine(i, task)
-        between = [i for i in self.chosen if i not in self.found]
-        references, weights = self._places(between, {end.objective: i for i, end in ends.items()})
-        while between and not self.loop.ended:
-            i = min(between, key=lambda j: min((self._distance(j, k) for k in self.found), default=0.0))
-            between.remove(i)
-            show(f"meshes of the front: point {len(self.found) + 1} of {len(self.chosen)}")
-            self._refine(i, Scalarised(references[i], weights, units=self.units))
+            found[i] = self.found[i].best.F
 
     def points(self, elapsed: float, stopped: str) -> Points:
         """The front with the refined points, in the same order, and what they cost."""
@@ -159,26 +180,19 @@ class FrontRefinement:
         """Whether the best point in the objective that is marked (m,) is an optimum of that alone. Another local optimum may be better."""
         nlp, point = self.loop.programs(self.methods[i]), self.front[i]
         known = self._known(i)
-        if known and optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= STATIONARY:
+        if known and optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= FRONT.stationary:
             return True
         solved = self.solves(nlp, point.decision, Scalarised(np.where(mine, 0.0, np.inf), self.units))
         if solved.status != CONVERGED:
             return not known
         others = np.array([self._distance(i, j) for j in self.good.tolist() if j != i])
-        nearby = STATIONARY if known else NEARBY * others[others > 0].min(initial=0.0 if len(others) == 0 else np.inf)
+        nearby = FRONT.stationary if known else FRONT.nearby * others[others > 0].min(initial=0.0 if len(others) == 0 else np.inf)
         return float(np.linalg.norm((solved.F - point.F) / self.units)) <= nearby
 
     def _known(self, i: int) -> bool:
         """Whether a point is known to be optimal on its own mesh."""
         certified = self.front[i].optimality
-        return certified is not None and certified <= OPTIMAL
-
-    def _places(self, between: Sequence[int], ends: dict[int, int]) -> tuple[dict[int, np.ndarray], np.ndarray]:
-        """Where the points between the ends are solved from, and along which weights; see `moved_along`."""
-        F, known = self.front.F, list(ends.values()) if len(ends) == len(self.units) else []
-        new = np.array([self.found[i].best.F for i in known]).reshape(-1, len(self.units))
-        references, weights = moved_along(F[between], F[known], new, self.units)
-        return dict(zip(between, references, strict=True)), weights
+        return certified is not None and certified <= FRONT.optimal
 
     def _distance(self, i: int, j: int) -> float:
         return float(np.linalg.norm((self.front.F[i] - self.front.F[j]) / self.units))
@@ -189,7 +203,7 @@ class FrontRefinement:
         known = self._known(i)
         trajectory = self._trajectory(i)
         begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, self.units, known)
-        near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[:NEIGHBOURS]
+        near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[: FRONT.neighbours]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
         near_meshes = self._meshes_near(done, begun.verdict.error, task)
         # Rough controls would need finer meshes than optimal ones.
@@ -197,7 +211,7 @@ class FrontRefinement:
         hints = list(dict.fromkeys([*near_meshes, *own]))
         if self._most_work is not None:
             # One point that resists is not to take what is meant for the others.
-            share = (OF_END if isinstance(task, LexicographicEnd) else OF_ONE) * self._most_work / len(self.chosen)
+            share = (FRONT.of_end if isinstance(task, LexicographicEnd) else FRONT.of_one) * self._most_work / len(self.chosen)
             self.loop.most_work = min(self._most_work, self.loop.work + share)
         self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
         self.loop.most_work = self._most_work
@@ -208,7 +222,7 @@ class FrontRefinement:
         if not done:
             return []
         nearest = self.found[done[0]]
-        if error > HINTED:
+        if error > FRONT.hinted:
             return nearest.meshes[-2:]
         # Where no other mesh has to confirm it, its program is there already. An end is far from others.
         return [] if self.wanted.confirmed or isinstance(task, LexicographicEnd) else [nearest.best.method]
@@ -228,3 +242,69 @@ class FrontRefinement:
         found = certified(nlp, best.z[None], self.units) if best.by_gradients else {}
         about: dict[str, Any] = {**found, "notes": [note], "trajectories": [best.trajectory]}
         return from_vectors(nlp, best.z[None], front.solver, front.stats, **about)
+
+
+def solved_on(
+    points: Points, rows: Sequence[int], fine: Meshed, programs: Programs, show: Callable[[str], None] = lambda words: None
+) -> Points:
+    """The points in their order, of which those in `rows` have been solved on one mesh, as far as that succeeds; these not simulated.
+
+    Nothing is simulated in between: a simulation of all takes less time than those of one after the other.
+    """
+    if not (rows and differentiable(points.compiled())):
+        return points
+    # Asked to end, what was not solved stays as it was.
+    with suppress(Stopped):
+        job = _FineFront(points, rows, programs(fine), GradientSolves(float(points.stats["tolerance"])))
+        job.go(show)
+        return job.points()
+    return points
+
+
+class _FineFront:
+    """The points of one front on one mesh, those that are done: row -> result."""
+
+    def __init__(self, points: Points, rows: Sequence[int], nlp: NLP, solves: GradientSolves) -> None:
+        self.front, self.rows, self.nlp, self.solves = points, list(rows), nlp, solves
+        self.done: dict[int, Solved] = {}
+        self.units = MeshLoop.units(points.F[self.rows], nlp, self._start(self.rows[0]))
+
+    def go(self, show: Callable[[str], None]) -> None:
+        """Solve all points, or those until the work is to end."""
+        F, ends = self.front.F, dict[int, LexicographicEnd]()
+        for objective, k in enumerate(extremes(F[self.rows])):
+            ends.setdefault(self.rows[k], LexicographicEnd.of(objective, self.units, F[self.rows[k]]))
+        between, found = [i for i in self.rows if i not in ends], dict[int, np.ndarray]()
+        for i, task in front_tasks(F, ends, between, self.units, found):
+            # Of the ends all are begun, so that what is between them is not taken for an end.
+            if stopping() and i not in ends:
+                break
+            self._solve(i, task, show)
+            found |= {i: self.done[i].F} if i in self.done else {}
+
+    def points(self) -> Points:
+        """The front with the points that are done, and what they cost."""
+        front, done = self.front, list(self.done)
+        Z = np.array([self.done[i].z for i in done]).reshape(-1, len(self.nlp.variables))
+        found = from_vectors(self.nlp, Z, front.solver, front.stats, sort=False, **certified(self.nlp, Z, self.units))
+        rows = [found[[done.index(i)]] if i in self.done else front[[i]] for i in range(len(front))]
+        stats = more_costs(front.stats, self.solves.counts, 0.0, "")
+        return Points.concatenate(rows).replace(solver=front.solver, stats=stats, message=front.message)
+
+    def _solve(self, i: int, task: Scalarised, show: Callable[[str], None]) -> None:
+        """Solve one point from its own trajectory and, if it is lost or gets worse, from its neighbours on this mesh."""
+        show(f"points on a finer mesh: {len(self.done) + 1} of {len(self.rows)}")
+        near = sorted(self.done, key=lambda j: self._distance(i, j))[: FRONT.neighbours]
+        starts = (Start(z, drift=LOOP.drift) for z in (self._start(i), *(self.done[j].z for j in near)))
+        with self.solves.at_most(FRONT.patience):
+            best = best_of(task, self.solves, self.nlp, starts, task.loss(self.front.F[i]))
+        if best.status == CONVERGED:
+            self.done[i] = best
+
+    def _start(self, i: int) -> np.ndarray:
+        trajectory = self.front.trajectories[i]
+        assert trajectory is not None
+        return self.nlp.interpolate(trajectory)
+
+    def _distance(self, i: int, j: int) -> float:
+        return float(np.linalg.norm((self.front.F[i] - self.front.F[j]) / self.units))

@@ -1,0 +1,474 @@
+"""Optima on meshes that suit them: sought on coarse meshes, refined until simulations agree, with others looked at where one misleads.
+
+One search for all that is given no transcription: a single optimum, the ends of a front, and with these the mesh of a search. A coarse mesh
+may have no feasible point, or hide the best optimum; another one often has it. None decides alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from problems.compiled import CompiledProblem
+from problems.problem import Problem
+from transcription import DFET
+from transcription.base import NLP, Transcription
+from transcription.catalogue import stated
+from transcription.meshed import Meshed
+from transcription.meshes.verdict import Wanted
+from transcription.nlp.scalarized import Solved
+from transcription.phases.mesh import PhaseMesh
+from transcription.stopping import Stopped
+
+from ..evaluation.evaluator import CONVERGED, Counts
+from ..fronts.builders import certified, from_vectors
+from ..fronts.points import Points
+from ..fronts.verified import verified
+from ..gradients.ends import lexicographic_ends
+from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, guessed_start, is_least
+from ..gradients.scalarised import WORK, GradientSolves, LexicographicEnd, Scalarised
+from .mesh_loop import MeshLoop, Programs, Refinement, differentiable
+
+COARSE: tuple[Meshed, ...] = (
+    DFET(8, 3, basis="bernstein"),
+    DFET(8, 3),
+    DFET(12, 3, basis="bernstein"),
+    DFET(4, 4),
+    DFET(20, 3),
+    DFET(20, 3, basis="bernstein", control_order=1),
+)
+"""Meshes to begin on, in the order in which they are tried: where one leads nowhere, another often does."""
+SECOND: Meshed = DFET(16, 3)
+"""A mesh for other starts, beside that from which an optimum came: what one basis hides another may show."""
+
+
+@dataclass(frozen=True)
+class MeshSearchLimits:
+    """How meshes are searched, and when an optimum is good."""
+
+    optimum: float = 0.1  # what a single optimum may miss, as a part of what points may
+    ends: float = 1.0  # the same for the ends of a front, on the mesh of a search: points get meshes of their own
+    meshes: int = 8  # most meshes of one optimum, beside the coarse one
+    share: float = 0.5  # work of other starts on another mesh, and of refining what they find, as a part of that before
+    passable: float = 5.0  # times what is wanted that a point may miss where other meshes are tried only as long as that takes little
+    hopeless: int = 2  # coarse meshes without anything feasible after which no other is tried
+    clearly: float = 1e-3  # part of its unit by which an objective on a coarse mesh differs that is another optimum
+    refined: int = 2  # most other optima that are refined
+    elements: int = 40  # most of a phase on a common mesh: a search evaluates it thousands of times
+    near: float = 0.25  # an edge is left out if the element is then longer than the shortest there by at most this part
+    lost: float = 0.1  # part of its range by which a mesh may miss a guess: on a coarser one what it says is lost
+    guessed: tuple[int, ...] = (8, 16, 32)  # numbers of cubic elements that are considered for that
+
+
+SEARCH = MeshSearchLimits()
+
+
+def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
+    """The problem's own default, or a coarse mesh."""
+    own = problem.default_transcription if isinstance(problem, Problem) else None
+    return COARSE[0] if own is None else stated(own)
+
+
+def coarse_meshes(problem: Problem | CompiledProblem) -> list[Meshed]:
+    """Meshes to begin on, in the order in which they are tried: those that describe a guess, the problem's own, and coarse ones."""
+    own = default_transcription(problem)
+    coarse = list(dict.fromkeys([own, *COARSE] if isinstance(own, Meshed) else COARSE))
+    elements = guessed_elements(problem.compile())
+    if elements > coarse[0].elements:
+        coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
+    return coarse
+
+
+def guessed_elements(problem: CompiledProblem) -> int:
+    """The least number of equal elements on which cubic polynomials describe each guessed profile of a problem, as far as such are
+    considered; the least of these if no profile is guessed."""
+    guesses = (guess for phase in problem.phases for guess in phase.guesses.values())
+    profiles = [guess for guess in guesses if np.ndim(guess) and np.ndim(guess[0]) == 1 and len(guess[0]) > 2]
+    enough = (count for count in SEARCH.guessed if all(_missed(times, values, count) <= SEARCH.lost for times, values in profiles))
+    return next(enough, SEARCH.guessed[-1])
+
+
+def _missed(times: np.ndarray, values: np.ndarray, count: int) -> float:
+    """The largest difference of `count` cubic polynomials from samples, in the range of these."""
+    size, nodes = float(np.ptp(values)), np.cos(np.linspace(np.pi, 0.0, 4))
+    if size == 0.0:
+        return 0.0
+    places = np.linspace(times[0], times[-1], count + 1)
+    middles, half = 0.5 * (places[:-1] + places[1:]), 0.5 * (places[1] - places[0])
+    coefficients = np.interp(middles[:, None] + half * nodes, times, values) @ np.linalg.inv(np.vander(nodes)).T
+    own = np.clip(np.searchsorted(places, times, side="right") - 1, 0, count - 1)
+    powers = np.vander((np.asarray(times) - middles[own]) / half, len(nodes))
+    return float(np.abs((coefficients[own] * powers).sum(axis=1) - values).max()) / size
+
+
+@dataclass(frozen=True, eq=False)
+class MeshedOptimum:
+    """An optimum on a mesh that was found for it."""
+
+    method: Meshed  # the coarse mesh that it came from
+    coarse: NLP
+    solved: Solved  # on that; where no solve converged, the least infeasible result
+    rule: MultistartStopping  # what starts there led to
+    alpha: float = np.inf  # what the solve minimised, at its result
+    nlp: NLP | None = None  # of the mesh that suits it
+    refinement: Refinement | None = None  # None where no solve on the coarse mesh converged
+    unit: float = 1.0  # what of alpha counts as one
+    loss: float = np.inf  # alpha on its best mesh
+    achieved: float = np.inf  # the least alpha that its simulations have for certain
+    behind: float = 0.0  # by how much it is worse, in units, than what another one achieved when simulated; 0 if it is not
+    exhausted: bool = False  # whether the search ended at the most work
+
+    @property
+    def z(self) -> np.ndarray:
+        """The vector (n,) of its program."""
+        return self.solved.z if self.refinement is None else self.refinement.best.z
+
+    @property
+    def program(self) -> NLP:
+        """That of its best mesh."""
+        return self.nlp or self.coarse
+
+    @property
+    def status(self) -> str:
+        """That of the solves on its mesh: what is refined is an optimum."""
+        return self.solved.status if self.refinement is None else CONVERGED
+
+    @property
+    def good(self) -> bool:
+        """Whether simulations agree with it as well as is wanted."""
+        return self.refinement is not None and not self.refinement.complaints() and not self.behind
+
+    def certain(self, task: Scalarised) -> bool:
+        """Whether no other start is expected to lead to less: it is good, and all that were made led to it, or bounds allow no less."""
+        alike = self.hits == self.rule.converged > 1
+        return self.good and (alike or is_least(self.program, self.z, task))
+
+    @property
+    def optima(self) -> int:
+        """How many different optima starts on its coarse mesh found."""
+        return self.rule.optima(SEARCH.clearly * self.unit)
+
+    @property
+    def hits(self) -> int:
+        """How many of these starts led to it."""
+        return self.rule.hits(self.alpha, SEARCH.clearly * self.unit)
+
+    @property
+    def note(self) -> str:
+        """Why it is not good, or what else is to be said of it."""
+        note = f"no solve converged: {self.solved.message}" if self.refinement is None else self.refinement.note
+        behind = f"it is worse by {self.behind:.1e} of its size than what another one achieved when simulated" if self.behind else ""
+        exhausted = "it ended at the most work of a default call: name a transcription" if note and self.exhausted else ""
+        return "; ".join(words for words in (behind, note, exhausted) if words)
+
+
+class TaskOptima:
+    """The optima of one scalarised problem from several coarse meshes, and which of them is best."""
+
+    def __init__(self, loop: MeshLoop, task: Scalarised, end: int | None) -> None:
+        self.loop, self.task, self.end = loop, task, end
+        self.all: list[MeshedOptimum] = []
+        self._units = np.full(len(task.weights), np.inf)
+
+    def add(self, method: Meshed, nlp: NLP, solved: Solved, rule: MultistartStopping) -> None:
+        """Refine the result of a solve on a coarse mesh if it converged."""
+        loop = self.loop
+        one = MeshedOptimum(method, nlp, solved, rule, self.task.loss(solved.F))
+        if solved.status == CONVERGED:
+            # Objectives that are large only where an attempt is poor are not to be judged by that.
+            self._units = units = np.minimum(self._units, loop.units(solved.F[None], nlp, solved.z))
+            task = replace(self.task, units=units) if self.end is None else LexicographicEnd.of(self.end, units, solved.F)
+            with suppress(Stopped):
+                begun = loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True)
+                one = self._refined(one, loop.refine(begun, task), units)
+        self.all.append(one)
+
+    def _refined(self, one: MeshedOptimum, refinement: Refinement, units: np.ndarray) -> MeshedOptimum:
+        best, task = refinement.best, self.task
+        unit = 1.0 / float(np.max((task.weights / units)[task.moving])) * float(np.max(task.weights[task.moving]))
+        loss = task.loss(best.F)
+        known = [] if best.achieved is None else [task.loss(best.achieved) + best.doubt * unit]
+        known += [loss - refinement.worse * unit] if refinement.worse else []
+        nlp, achieved = self.loop.programs(best.method), min(known, default=np.inf)
+        return replace(one, nlp=nlp, refinement=refinement, unit=unit, loss=loss, achieved=achieved)
+
+    @property
+    def best(self) -> MeshedOptimum:
+        """The best by its errors, of which one is to be worse than what another one achieved."""
+        least, settled = min(one.achieved for one in self.all), self.loop.wanted.settled
+        behind = [max((one.loss - least) / one.unit, 0.0) if np.isfinite(one.loss) and np.isfinite(least) else 0.0 for one in self.all]
+        behind = [amount if amount > settled else 0.0 for amount in behind]
+        i = min(range(len(self.all)), key=lambda k: self._rank(self.all[k], behind[k] / settled))
+        return replace(self.all[i], behind=behind[i])
+
+    @staticmethod
+    def _rank(one: MeshedOptimum, behind: float) -> tuple[bool, float]:
+        """Those that were refined first, by their errors, of which one is being behind; then the others by their violation."""
+        return (True, one.solved.violation) if one.refinement is None else (False, max(one.refinement.best.error, behind))
+
+    @property
+    def passable(self) -> bool:
+        """Whether the best is known to be nearly as good as is wanted, in the spans of bounds: what states do may be little of these."""
+        best = self.best
+        if best.refinement is None:
+            return False
+        point, wanted = best.refinement.best, self.loop.wanted
+        simulation, settled = point.verdict.simulation, max(point.verdict.off, point.change, best.behind) / wanted.settled
+        excess = max(simulation.violation, point.verdict.excess) / wanted.feasible
+        return max(simulation.max_defect / wanted.tolerance, excess, settled) <= SEARCH.passable and point.verdict.leaving <= wanted.leaving
+
+
+class MeshSearch:
+    """Search for the optima of scalarised problems of one problem on meshes that suit them; with `ends`, they are the ends of its front."""
+
+    def __init__(
+        self,
+        loop: MeshLoop,
+        tasks: Sequence[Scalarised],
+        given: Callable[[NLP], np.ndarray | None],
+        starts: int | None,
+        rng: np.random.Generator,
+        ends: bool = False,
+    ) -> None:
+        self.loop, self.tasks = loop, [TaskOptima(loop, task, i if ends else None) for i, task in enumerate(tasks)]
+        self._given, self._starts, self._rng, self._ends = given, starts, rng, ends
+        self.solvers: dict[Meshed, MultistartSolver] = {}
+        self.coarse: dict[Meshed, list[Solved]] = {}  # the results of all tasks on a coarse mesh
+        self._explored: list[set[Meshed]] = [set() for _ in tasks]
+        self.exhausted, self._hopeless = False, 0
+
+    def go(self, coarse: Sequence[Meshed]) -> None:
+        """Solve on coarse meshes and refine what they lead to, until all is good or another mesh does not pay; then from other starts."""
+        for method in coarse:
+            try:
+                self._begin(method)
+            except Stopped:
+                if not self.tasks[-1].all:
+                    raise
+                break
+            if self._ends and self.loop.most_work is None:
+                # What is begun on the first mesh is ended; others are limited.
+                self.loop.most_work = len(self.tasks) * WORK.most
+            self.exhausted = self.loop.most_work is not None and self.loop.work >= self.loop.most_work
+            if self._enough:
+                break
+        if self._starts is None:
+            for i, optima in enumerate(self.tasks):
+                if not optima.best.certain(optima.task):
+                    self._elsewhere(i)
+
+    def best(self, i: int) -> MeshedOptimum:
+        """The best optimum of task i."""
+        return replace(self.tasks[i].best, exhausted=self.exhausted)
+
+    @property
+    def _enough(self) -> bool:
+        """Whether no other coarse mesh is to be tried."""
+        best = [optima.best for optima in self.tasks]
+        if any(one.refinement is None for one in best):
+            return self._hopeless >= SEARCH.hopeless or self.loop.ended
+        passable = all(one.good or optima.passable for one, optima in zip(best, self.tasks, strict=True))
+        return all(one.good for one in best) or self.loop.ended or (passable and self.loop.work >= WORK.little)
+
+    def _begin(self, method: Meshed) -> None:
+        """Solve all tasks on a coarse mesh, from further starts if these were not made yet, and refine what is best; where that leads to no
+        good point, also what the first start gave: an optimum that is better on a coarse mesh may be none."""
+        nlp = self.loop.programs(method)
+        self.solvers[method] = solver = MultistartSolver(nlp, self._given(nlp), self._starts or 1, self._rng, self.loop.solves)
+        first, rules = list[Solved](), list[MultistartStopping]()
+
+        def single(i: int) -> Solved:
+            optima, rule = self.tasks[i], MultistartStopping()
+            solved = solver.solve(optima.task)
+            solved = solver.with_feasible_start(solved, optima.task) if self._starts is None else solved
+            rule.add(self._loss(optima, solved))
+            first.append(solved)
+            rules.append(rule)
+            if self._starts or self._explored[i] or solved.status != CONVERGED or solver.is_least(solved, optima.task):
+                return solved
+            self._explored[i].add(method)
+            others = self._drawn(optima, solver, solved, rule, self.loop.work + WORK.little)
+            return min([solved, *others], key=optima.task.rank)
+
+        self.coarse[method] = best = lexicographic_ends(solver, single) if self._ends else [single(0)]
+        self._hopeless += solver.closest is not None
+        for optima, one, other, rule in zip(self.tasks, first, best, rules, strict=True):
+            if optima.all and optima.best.good:
+                continue
+            optima.add(method, nlp, other, rule)
+            if other is not one and not self._ends and not optima.best.good and not self.loop.ended:
+                optima.add(method, nlp, one, rule)
+
+    @staticmethod
+    def _loss(optima: TaskOptima, solved: Solved) -> float | None:
+        return optima.task.loss(solved.F) if solved.status == CONVERGED else None
+
+    def _drawn(self, optima: TaskOptima, solver: MultistartSolver, known: Solved, rule: MultistartStopping, most: float) -> list[Solved]:
+        """Optima that starts that are drawn lead to on a coarse mesh, of which one is known, until there are enough, or `most` work is
+        done."""
+        found: list[Solved] = []
+        nearby = known if known.status == CONVERGED else None
+        with suppress(Stopped), self.loop.solves.at_most(MULTISTART.iterations):
+            while not (rule.enough or self.loop.ended or self.loop.work >= most):
+                solved = solver.from_drawn(optima.task, nearby)
+                loss = self._loss(optima, solved)
+                nearby = solved if rule.add(loss) else nearby
+                found += [solved] if loss is not None else []
+        return found
+
+    def _elsewhere(self, i: int) -> None:
+        """Begin from other starts on coarse meshes where that was not done yet, as long as it takes little; refine what is better there
+        than the best optimum, or, where that is not good, what is different."""
+        loop, optima, before = self.loop, self.tasks[i], self.loop.work
+        others: list[tuple[float, Meshed, Solved, MultistartStopping]] = []
+        budget = max(SEARCH.share * before, WORK.little) / len(self.tasks)
+        best = optima.best
+        for method in dict.fromkeys((best.method, SECOND)):
+            if method not in self._explored[i]:
+                with suppress(Stopped):
+                    others += self._others(i, method, before + budget)
+        usual, most = loop.most_work, loop.work + budget
+        loop.most_work = most if usual is None else min(most, usual)
+        for _, method, solved, rule in sorted(others, key=lambda other: other[0])[: SEARCH.refined]:
+            if not loop.ended:
+                optima.add(method, self.solvers[method].nlp, solved, rule)
+        loop.most_work = usual
+
+    def _others(self, i: int, method: Meshed, most: float) -> list[tuple[float, Meshed, Solved, MultistartStopping]]:
+        """Other optima on a coarse mesh that are worth refining, and by how much they are worse there than the best, in its units."""
+        loop, optima = self.loop, self.tasks[i]
+        best = optima.best
+        if loop.ended or loop.work >= most or best.refinement is None:
+            return []
+        if method == best.method:
+            solver, known, rule = self.solvers[method], best.solved, best.rule
+        else:
+            nlp, rule = loop.programs(method), MultistartStopping()
+            solver = self.solvers.setdefault(method, MultistartSolver(nlp, None, 1, self._rng, loop.solves))
+            with loop.solves.at_most(MULTISTART.iterations):
+                known = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), optima.task)
+            rule.add(self._loss(optima, known))
+        least = optima.task.loss(known.F) if known.status == CONVERGED else np.inf
+        seen, found = [least], list[tuple[float, Meshed, Solved, MultistartStopping]]()
+        for solved in self._drawn(optima, solver, known, rule, most):
+            loss = optima.task.loss(solved.F)
+            if all(abs(loss - other) > SEARCH.clearly * best.unit for other in seen):
+                seen.append(loss)
+                if loss < least or not best.good:
+                    found.append(((loss - least) / best.unit, method, solved, rule))
+        return found
+
+
+@dataclass(frozen=True)
+class SearchMeshes:
+    """Where a problem is solved for which no transcription is given."""
+
+    search: Transcription  # for the candidates of a search: cheap
+    fine: Meshed | None  # a finer mesh, where one is needed for points that a simulation confirms
+    counts: Counts  # what it cost to find out
+    ends: Points | None = None  # the ends of the front on the mesh of the search
+    refined: Points | None = None  # the same on meshes of their own
+    rules: Mapping[int, MultistartStopping] = field(default_factory=dict)  # what starts found for each objective
+
+
+def search_meshes(
+    statement: Problem | CompiledProblem,
+    verify: float,
+    tolerance: float,
+    show: Callable[[str], None] = lambda words: None,
+    given: Callable[[NLP], np.ndarray | None] | None = None,
+    starts: int | None = None,
+) -> SearchMeshes:
+    """The problem's own default transcription, or DFET on a coarse mesh for a search, and on a mesh for all points of its front.
+
+    Without a default, each end of the front is sought on coarse meshes and then on finer ones, until a simulation agrees and a finer mesh
+    changes nothing. The fine mesh has the elements of all these.
+    """
+    problem = statement.compile()
+    if isinstance(statement, Problem) and statement.default_transcription is not None:
+        return SearchMeshes(stated(statement.default_transcription), None, Counts())
+    if not differentiable(problem):
+        return SearchMeshes(COARSE[0], None, Counts())
+    show("ends of the front on coarse meshes")
+    limits, m = SEARCH.ends * verify, len(problem.goals)
+    wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
+    loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, knots=False)
+    tasks = [Scalarised.single(i, m) for i in range(m)]
+    search = MeshSearch(loop, tasks, given or guessed_start, starts, np.random.default_rng(0), ends=True)
+    search.go(coarse_meshes(statement))
+    return _chosen(search, limits)
+
+
+def _chosen(search: MeshSearch, limits: float) -> SearchMeshes:
+    """The mesh of a search: that of the best ends; the fine one has the elements of all meshes that suit these."""
+    loop, best = search.loop, [search.best(i) for i in range(len(search.tasks))]
+    counts, own = loop.solves.counts, [i for i, one in enumerate(best) if one.refinement is not None]
+    if not own:
+        return SearchMeshes(next(iter(search.coarse)), None, counts)
+    # An end that came from another mesh than the first is hidden by that.
+    methods = list(search.solvers)
+    method = methods[max(methods.index(best[i].method) for i in own)]
+    solved = _ends_on(search, method, best)
+    converged = [i for i in own if solved[i].status == CONVERGED]
+    solver, stats = search.solvers[method], {"tolerance": loop.solves.tolerance}
+    Z = np.array([solved[i].z for i in converged]).reshape(-1, len(solver.nlp.variables))
+    ends = from_vectors(solver.nlp, Z, {}, stats, sort=False, **certified(solver.nlp, Z, None))
+    refinements = [one.refinement for one in best if one.refinement is not None]
+    rows = []
+    for one in (refinement.best for refinement in refinements):
+        nlp = loop.programs(one.method)
+        rows.append(from_vectors(nlp, one.z[None], {}, stats, trajectories=[one.trajectory], **certified(nlp, one.z[None], None)))
+    moved = [abs(best[i].loss - solved[i].F[i]) / best[i].unit for i in converged]
+    same = len(converged) == len(own) and verified(ends, limits).verified.all() and max(moved, default=0.0) <= limits
+    fine = method if same else _common([refinement.best.method for refinement in refinements], loop.problem)
+    rules = {i: best[i].rule for i in own}
+    return SearchMeshes(method, None if fine == method else fine, counts, ends, Points.concatenate(rows).replace(stats=stats), rules)
+
+
+def _ends_on(search: MeshSearch, method: Meshed, best: Sequence[MeshedOptimum]) -> list[Solved]:
+    """The ends of the front on a coarse mesh, from the best that are known."""
+    solver, solved = search.solvers[method], search.coarse.get(method, [])
+    if solved and all(one.refinement is None or one.solved is known for one, known in zip(best, solved, strict=True)):
+        return solved
+
+    def single(i: int) -> Solved:
+        one = best[i]
+        if one.method == method or one.refinement is None:
+            return one.solved
+        return solver.from_vector(solver.nlp.interpolate(one.refinement.best.trajectory), search.tasks[i].task)
+
+    return lexicographic_ends(solver, single)
+
+
+def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Meshed:
+    """DFET on one mesh that has the elements and degrees of several."""
+    meshes = {phase.name: _together([method.mesh_of(phase.name) for method in methods]) for phase in problem.phases}
+    basis = "lobatto" if all(getattr(method, "basis", "") == "lobatto" for method in methods) else "bernstein"
+    return DFET(COARSE[0].elements, COARSE[0].order, basis=basis, mesh=meshes)
+
+
+def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
+    """A mesh with the edges of several, without those that divide what no single mesh divides as finely. Its degree is one above theirs:
+    points between the ends may be harder than these."""
+    edges = sorted({edge for mesh in meshes for edge in mesh.edges})
+    while len(edges) > 2:
+        joined = np.array(edges[2:]) - np.array(edges[:-2])
+        # How long the element without an edge would be, in those that the meshes have there.
+        excess = joined / np.array([min(_length_at(mesh, edge) for mesh in meshes) for edge in edges[1:-1]])
+        k = int(np.argmin(excess))
+        if excess[k] > 1.0 + SEARCH.near and len(edges) - 1 <= SEARCH.elements:
+            break
+        del edges[k + 1]
+    orders = [mesh.control_order for mesh in meshes]
+    controls = None if None in orders else max(order for order in orders if order is not None)
+    return PhaseMesh(tuple(edges), 1 + max(mesh.order for mesh in meshes), controls)
+
+
+def _length_at(mesh: PhaseMesh, place: float) -> float:
+    """The length of the shortest element of a mesh that has a place in it or at its end."""
+    edges = np.array(mesh.edges)
+    touching = (edges[:-1] <= place) & (place <= edges[1:])
+    return float(np.diff(edges)[touching].min())

@@ -1,0 +1,303 @@
+"""Meshes that are found where none is given: for a search, and for a single optimum; honest where no solve converges."""
+
+from __future__ import annotations
+
+import gc
+from dataclasses import replace
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from problems.cases.standard.collection import published
+
+from macs import MACS, NSGA2, optimize
+from macs.gradients.scalarised import GradientSolves, Scalarised
+from macs.refinement.mesh_loop import LOOP, MeshLoop, Programs
+from macs.refinement.mesh_search import COARSE, SEARCH, MeshSearch, _together, default_transcription, guessed_elements, search_meshes
+from problems import Problem, load
+from transcription import DFET, parse
+from transcription.base import NLP
+from transcription.meshes.verdict import Wanted
+from transcription.nlp.program import nlp_scales
+from transcription.phases.mesh import PhaseMesh
+
+
+def smooth() -> Problem:
+    """A cart from rest to rest: time against effort, 12 / T^3."""
+    problem = Problem("cart")
+    move = problem.phase("move", t0=0.0, tf=(1.0, 2.0))
+    x, v = move.state("x", bounds=(-1, 2), initial=0, final=1), move.state("v", bounds=(-5, 5), initial=0, final=0)
+    u = move.control("u", bounds=(-20, 20))
+    move.dynamics(x=v, v=u)
+    problem.minimize("time", move.tf)
+    problem.minimize("effort", move.integral(u**2))
+    assert x is not None
+    return problem
+
+
+def layered(width: float) -> Problem:
+    """A state that falls from 1 within `width` of a phase of length 1, and rises to 1 again as late, for little effort."""
+    problem = Problem("layers")
+    run = problem.phase("run", t0=0.0, tf=1.0)
+    x = run.state("x", bounds=(-3, 3), initial=1.0)
+    u = run.control("u", bounds=(-5, 5))
+    run.dynamics(x=(u - x**3) / width)
+    problem.minimize("cost", run.integral(0.5 * (x**2 + u**2)) / width)
+    problem.minimize("miss", (run.final(x) - 1.5) ** 2)
+    return problem
+
+
+def test_a_problem_has_its_own_default_or_a_coarse_mesh():
+    assert default_transcription(load("goddard")) == parse("dfet:4x6")
+    assert default_transcription(smooth()) == default_transcription(smooth().compile()) == COARSE[0]
+
+
+@pytest.mark.slow
+def test_a_smooth_problem_keeps_the_coarse_mesh():
+    found = search_meshes(smooth(), 1e-3, 1e-6)
+    assert found.search == COARSE[0] and found.fine is None and 2 <= found.counts.gradient_solves < 60
+    assert found.ends is not None and len(found.ends) == 2
+
+
+@pytest.mark.slow
+def test_boundary_layers_get_short_elements():
+    found = search_meshes(layered(0.01), 1e-3, 1e-6)
+    assert found.search == COARSE[0] and found.fine is not None
+    edges = np.array(found.fine.mesh_of("run").edges)
+    assert len(edges) - 1 <= SEARCH.elements
+    lengths = np.diff(edges)
+    assert lengths[0] < 0.03 and lengths[-1] < 0.03 and lengths.max() > 0.05
+
+
+@pytest.mark.slow
+def test_a_search_without_a_transcription_finds_one():
+    front = MACS(agents=4, archive=5).solve(layered(0.02), evaluations=200, seed=1)
+    assert len(front) >= 3 and front.verified.all()
+    assert front.stats["gradient_solves"] > 200 // 20, "what the mesh cost is counted"
+
+
+@pytest.mark.slow
+def test_a_search_begins_with_the_optima_of_single_objectives():
+    """Of this arm's quickest way there are many local optima, in which searches of thousands of candidates end: 3.2 seconds and more."""
+    front = MACS(agents=4).solve(load("standard/two_link_arm"), evaluations=30, seed=1)
+    assert front.verified.all() and front.F.min() == pytest.approx(published("two_link_arm")[0].value, rel=5e-4)
+
+
+@pytest.mark.slow
+def test_a_search_keeps_the_ends_that_were_found_for_its_mesh():
+    """A few evaluations lead to few points. Least effort in a time T is 12 / T^3, least time 1."""
+    problem = smooth()
+    found = MACS(agents=4).solve(problem, evaluations=6, seed=1)
+    assert found.verified.all() and found.objectives[0] == pytest.approx([1.0, 12.0], rel=1e-4)
+    assert found.objectives[-1] == pytest.approx([2.0, 12 / 2**3], rel=1e-4)
+
+
+def test_what_peaks_forbid_is_searched_on_the_coarse_mesh():
+    problem = smooth()
+    problem.maximize("top speed", problem.phases["move"].peak(ca.fabs(problem.phases["move"]["v"])))
+    assert search_meshes(problem, 1e-3, 1e-6).fine is None
+
+
+meshes = st.lists(
+    st.lists(st.integers(1, 99), min_size=0, max_size=12, unique=True).map(
+        lambda inner: PhaseMesh((0.0, *(place / 100 for place in sorted(inner)), 1.0), 3)
+    ),
+    min_size=1,
+    max_size=3,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(meshes)
+def test_a_common_mesh_is_about_as_fine_as_each_of_several(several):
+    common = np.array(_together(several).edges)
+    assert len(common) - 1 <= min(SEARCH.elements, sum(mesh.elements for mesh in several))
+    for begin, end in pairwise(common):
+        for low, high in (element for mesh in several for element in pairwise(mesh.edges)):
+            mostly = min(high, end) - max(low, begin) >= 0.5 * (high - low)
+            assert not mostly or end - begin <= 2.0 * (high - low) + 0.01 or len(common) - 1 == SEARCH.elements
+
+
+def test_degrees_are_higher_than_any():
+    one, two = PhaseMesh((0.0, 1.0), 3, 1), PhaseMesh((0.0, 0.5, 1.0), 5, 2)
+    assert (_together([one, two]).order, _together([one, two]).control_order) == (6, 2)
+    assert _together([one, PhaseMesh((0.0, 1.0), 2)]).control_order is None
+
+
+def test_a_mesh_with_more_elements_than_a_search_is_to_have_is_thinned_evenly():
+    fine = PhaseMesh(tuple(np.linspace(0, 1, 101).tolist()), 3)
+    lengths = np.diff(_together([fine]).edges)
+    assert len(lengths) == SEARCH.elements and lengths.max() / lengths.min() < 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("budget", [None, 300])
+def test_the_number_of_evaluations_has_a_default(budget):
+    problem = smooth()
+    problem.default_evaluations = 250
+    front = NSGA2(population=10).solve(problem, evaluations=budget, seed=1)
+    assert front.stats["evaluations"] == (budget or 250)
+    if budget is None:
+        assert MACS(agents=4, archive=4).solve(problem, seed=1).stats["stopped"] == "done"
+
+
+def back_to_the_side() -> Problem:
+    """Dubins' car that is to go back and aside; its direction at the end is stated so that it may turn round on either side."""
+    problem = Problem("back")
+    drive = problem.phase("drive", t0=0.0, tf=(1.0, 30.0))
+    drive.state("x", bounds=(-10, 10), initial=0, final=-3)
+    drive.state("y", bounds=(-10, 10), initial=0, final=1)
+    heading = drive.state("heading", bounds=(-2 * np.pi, 2 * np.pi), initial=0)
+    turn = drive.control("turn", bounds=(-1, 1))
+    drive.dynamics(x=ca.cos(heading), y=ca.sin(heading), heading=turn)
+    problem.constraint("heading", ca.cos(drive.final(heading)), lower=1, upper=1)
+    problem.minimize("length", drive.tf)
+    return problem
+
+
+@pytest.mark.slow
+def test_other_starts_find_a_better_optimum():
+    """From the first start of this seed alone the car goes round the wrong way."""
+    record = published("dubins")[0]
+    alone, best = optimize(back_to_the_side(), starts=1, seed=1), optimize(back_to_the_side())
+    assert alone.verified and any(alone.F[0] == pytest.approx(other, rel=1e-3) for other in record.local)
+    assert best.verified and record.met(best.simulated["length"])
+    stats = best.alone().stats
+    assert stats["starts"] > stats["found"] >= 1 and stats["optima"] >= 2
+    assert alone.alone().stats["starts"] == 1
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_bits_from_several_starts():
+    one, two = (optimize(load("standard/stirred_tank"), starts=4, seed=4) for _ in range(2))
+    assert np.array_equal(one.decision, two.decision)
+
+
+@pytest.mark.slow
+def test_what_no_solve_reached_is_not_called_converged():
+    """A way of 2 in a time of 1 at a speed of 1, missed by hardly more than the tolerance of feasibility, is still no optimum."""
+    problem = Problem("too far")
+    trip = problem.phase("trip", t0=0.0, tf=1.0)
+    trip.state("x", bounds=(0, 4), initial=0, final=2)
+    v = trip.control("v", bounds=(0, 1))
+    trip.dynamics(x=v)
+    problem.minimize("effort", trip.integral(v**2))
+    point = optimize(problem, starts=2)
+    assert point.status != "converged" and not point.verified and "no solve converged" in point.note
+
+
+@pytest.mark.slow
+def test_feasible_but_not_optimal_is_not_called_converged():
+    """One iteration leaves a way feasible, and far from the least cost, which is huge elsewhere: in the scale of that nothing is left."""
+    problem = Problem("detour")
+    trip = problem.phase("trip", t0=0.0, tf=1.0)
+    x = trip.state("x", bounds=(-9, 9), initial=0)
+    v = trip.control("v", bounds=(-9, 9))
+    trip.dynamics(x=v)
+    problem.minimize("cost", trip.integral((ca.cosh(x - 3) - 1) ** 2 + v**2))
+    trip.guess(x=0, v=0)
+    point = optimize(problem, starts=1, max_iterations=1)
+    assert point.violation <= 1e-6 and point.status == "failed"
+    assert optimize(problem, starts=1).status == "converged"
+
+
+@pytest.mark.slow
+def test_an_objective_that_is_constant_has_no_scale_of_rounding():
+    problem = load("standard/obstacle")
+    assert nlp_scales(DFET(8, 3).transcribe(problem.compile())) == pytest.approx([1.0])
+    point = optimize(problem, starts=1)
+    assert point.status == "converged" and point.verified and point.alone().stats["inner_iterations"] < 2000
+
+
+def searched(loop, coarse=COARSE, m=1):
+    search = MeshSearch(loop, [Scalarised.single(0, m)], lambda nlp: None, 1, np.random.default_rng(0))
+    search.go(coarse)
+    return search.best(0)
+
+
+@pytest.mark.slow
+def test_what_is_worse_than_another_mesh_achieved_is_not_good(monkeypatch):
+    """Of three attempts the first two are called worse than they are: by errors they would be good."""
+    problem = load("standard/bryson_denham").compile()
+    loop = MeshLoop(Programs(problem), GradientSolves(1e-6), Wanted(1e-3, 1e-3, 1e-3, 1e-3), 8)
+    coarse, amounts, refine = [DFET(8, 3), DFET(8, 4)], iter([1.0, 0.0]), loop.refine
+    unsettled = iter([np.inf, 0.0])
+
+    def spoiled(begun, task):
+        real, amount = refine(begun, task), next(amounts)
+        real.best = replace(real.best, F=real.best.F + amount, achieved=real.best.achieved + amount, change=next(unsettled))
+        return real
+
+    monkeypatch.setattr(loop, "refine", spoiled)
+    best = searched(loop, coarse)
+    assert best.good and best.behind == 0.0 and best.refinement.best.F[0] == pytest.approx(4.0, rel=1e-3)
+    amounts, unsettled = iter([0.0, 1.0]), iter([1e-2, 0.0])
+    other = searched(loop, coarse)
+    assert not other.good and other.refinement.best.F[0] == pytest.approx(4.0, rel=1e-3)
+
+
+def found_for(problem: Problem, wanted: Wanted, coarse=COARSE, most_work: float | None = None):
+    compiled = problem.compile()
+    loop = MeshLoop(Programs(compiled), GradientSolves(1e-6), wanted, 8, most_work)
+    return searched(loop, coarse, len(compiled.goals)), loop
+
+
+PLAIN = Wanted(1e-3, 1e-3, 1e-3, 1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["breakwell", "bryson_denham", "hypersensitive", "linear_tangent", "moon_landing", "catalyst_mixing"])
+def test_a_mesh_is_found(name):
+    value = published(name)[0]
+    found, loop = found_for(load(f"standard/{name}"), PLAIN)
+    assert found.good and found.note == ""
+    simulated = found.refinement.best.verdict.simulation.objectives[value.objective]
+    assert value.met(simulated) and loop.solves.counts.gradient_solves <= 12
+
+
+@pytest.mark.slow
+def test_where_one_coarse_mesh_leads_nowhere_another_is_tried():
+    hopeless = DFET(1, 1, control_order=0)
+    problem = load("standard/bryson_denham")
+    found, _ = found_for(problem, PLAIN, (hopeless,))
+    assert not found.good and found.refinement is None
+    found, loop = found_for(problem, PLAIN, (hopeless, DFET(8, 3)))
+    assert found.good and loop.solves.counts.failures
+
+
+@pytest.mark.slow
+def test_work_ends_where_it_is_to_end():
+    problem, wanted = layered(0.02), Wanted(1e-6, 1e-6)
+    whole, free = found_for(problem, wanted)
+    part, loop = found_for(problem, wanted, most_work=0.3 * free.solves.counts.work)
+    assert whole.good and not part.good and ("change" in part.note or "finer mesh" in part.note)
+    assert (
+        loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.counts.work < 0.8 * free.solves.counts.work
+    )
+
+
+@pytest.mark.slow
+def test_programs_of_earlier_meshes_are_not_kept():
+    def alive() -> int:
+        gc.collect()
+        return sum(isinstance(one, NLP) for one in gc.get_objects())
+
+    before = alive()
+    found, _ = found_for(layered(0.02), Wanted(1e-6, 1e-6))
+    assert len(found.refinement.meshes) >= LOOP.kept and alive() - before <= LOOP.kept + 1
+
+
+@pytest.mark.parametrize(("periods", "elements"), [(1, 8), (8, 8), (16, 16), (200, SEARCH.guessed[-1])])
+def test_a_guess_that_turns_often_needs_more_elements(periods, elements):
+    problem = Problem("turns")
+    phase = problem.phase("phase", t0=0.0, tf=1.0)
+    x = phase.state("x", bounds=(-2, 2))
+    phase.dynamics(x=0.0)
+    problem.minimize("x", phase.final(x))
+    times = np.linspace(0.0, 1.0, 1001)
+    assert guessed_elements(problem.compile()) == SEARCH.guessed[0]
+    phase.guess(x=(times, np.sin(2 * np.pi * periods * times)))
+    assert guessed_elements(problem.compile()) == elements
