@@ -234,10 +234,11 @@ class MultistartSolver:
                 best = found
         return best
 
-    def with_feasible_start(self, solved: Solved, task: Scalarised) -> Solved:
+    def with_feasible_start(self, solved: Solved, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
         """The result of a solve, or, where that is not feasible, of one from a vector that is.
 
-        That vector is sought near the best that is known and near starts that are drawn. If there is none near any of them, the result is
+        That vector is sought near the best that is known and near starts that are drawn, of which fewest and most are `tries`. If there is
+        none near any of them, the result is
         what violates least, now and later: `closest`.
         """
         if self.closest is not None:
@@ -245,7 +246,7 @@ class MultistartSolver:
         if solved.violation <= self.solves.tolerance or len(self._F) > self._given:
             return solved
         tried, limit, known = list[Solved](), self.solves.counts.work + WORK.little, self.nearest(task)
-        fewest, most = MULTISTART.infeasible
+        fewest, most = tries or MULTISTART.infeasible
         while not stopping() and len(tried) < most and (len(tried) < fewest or self.solves.counts.work < limit):
             start = self._starts.draw()[0] if known is None else known
             near, known = self.solves.least_violation(self.nlp, start), None

@@ -41,6 +41,8 @@ COARSE: tuple[Meshed, ...] = (
     DFET(20, 3, basis="bernstein", control_order=1),
 )
 """Meshes to begin on, in the order in which they are tried: where one leads nowhere, another often does."""
+FINEST: Meshed = DFET(20, 3)
+"""That of these which is tried next where one has no feasible point."""
 SECOND: Meshed = DFET(16, 3)
 """A mesh for other starts, beside that from which an optimum came: what one basis hides another may show."""
 
@@ -55,6 +57,7 @@ class MeshSearchLimits:
     share: float = 0.5  # work of other starts on another mesh, and of refining what they find, as a part of that before
     passable: float = 5.0  # times what is wanted that a point may miss where other meshes are tried only as long as that takes little
     hopeless: int = 2  # coarse meshes without anything feasible after which no other is tried
+    infeasible: tuple[int, int] = (3, 3)  # fewest and most starts without a feasible vector on the first of these
     clearly: float = 1e-3  # part of its unit by which an objective on a coarse mesh differs that is another optimum
     refined: int = 2  # most other optima that are refined
     elements: int = 40  # most of a phase on a common mesh: a search evaluates it thousands of times
@@ -239,10 +242,14 @@ class MeshSearch:
         self.coarse: dict[Meshed, list[Solved]] = {}  # the results of all tasks on a coarse mesh
         self._explored: list[set[Meshed]] = [set() for _ in tasks]
         self.exhausted, self._hopeless = False, 0
+        # The starts of an end are on two meshes.
+        self._budget = 0.5 * WORK.little if ends else WORK.little
 
     def go(self, coarse: Sequence[Meshed]) -> None:
         """Solve on coarse meshes and refine what they lead to, until all is good or another mesh does not pay; then from other starts."""
-        for method in coarse:
+        left = list(coarse)
+        while left:
+            method = left.pop(0)
             try:
                 self._begin(method)
             except Stopped:
@@ -255,6 +262,10 @@ class MeshSearch:
             self.exhausted = self.loop.most_work is not None and self.loop.work >= self.loop.most_work
             if self._enough:
                 break
+            if self._hopeless and FINEST in left:
+                # A coarse mesh may have no feasible point where a finer one has.
+                left.remove(FINEST)
+                left.insert(0, FINEST)
         if self._starts is None:
             for i, optima in enumerate(self.tasks):
                 if not optima.best.certain(optima.task):
@@ -283,14 +294,15 @@ class MeshSearch:
         def single(i: int) -> Solved:
             optima, rule = self.tasks[i], MultistartStopping()
             solved = solver.solve(optima.task)
-            solved = solver.with_feasible_start(solved, optima.task) if self._starts is None else solved
+            if self._starts is None:
+                solved = solver.with_feasible_start(solved, optima.task, SEARCH.infeasible if not self._hopeless else MULTISTART.infeasible)
             rule.add(self._loss(optima, solved))
             first.append(solved)
             rules.append(rule)
             if self._starts or self._explored[i] or solved.status != CONVERGED or solver.is_least(solved, optima.task):
                 return solved
             self._explored[i].add(method)
-            others = self._drawn(optima, solver, solved, rule, self.loop.work + WORK.little)
+            others = self._drawn(optima, solver, solved, rule, self.loop.work + self._budget)
             return min([solved, *others], key=optima.task.rank)
 
         self.coarse[method] = best = lexicographic_ends(solver, single) if self._ends else [single(0)]
@@ -324,7 +336,7 @@ class MeshSearch:
         than the best optimum, or, where that is not good, what is different."""
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
         others: list[tuple[float, Meshed, Solved, MultistartStopping]] = []
-        budget = max(SEARCH.share * before, WORK.little) / len(self.tasks)
+        budget = self._budget if self._ends else max(SEARCH.share * before, WORK.little)
         best = optima.best
         for method in dict.fromkeys((best.method, SECOND)):
             if method not in self._explored[i]:
@@ -407,7 +419,7 @@ def _chosen(search: MeshSearch, limits: float) -> SearchMeshes:
     loop, best = search.loop, [search.best(i) for i in range(len(search.tasks))]
     counts, own = loop.solves.counts, [i for i, one in enumerate(best) if one.refinement is not None]
     if not own:
-        return SearchMeshes(next(iter(search.coarse)), None, counts)
+        return SearchMeshes(list(search.coarse)[-1], None, counts)
     # An end that came from another mesh than the first is hidden by that.
     methods = list(search.solvers)
     method = methods[max(methods.index(best[i].method) for i in own)]

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from problems.cases.standard.collection import published
 
 from macs import MACS, NSGA2, optimize
 from macs.gradients.scalarised import GradientSolves, Scalarised
 from macs.refinement.mesh_loop import LOOP, MeshLoop, Programs
 from macs.refinement.mesh_search import COARSE, SEARCH, MeshSearch, _together, default_transcription, guessed_elements, search_meshes
 from problems import Problem, load
+from problems.cases.standard import published
 from transcription import DFET, parse
 from transcription.base import NLP
 from transcription.meshes.verdict import Wanted
