@@ -225,7 +225,7 @@ def test_a_preference_of_another_problem_is_refused_before_any_work(prefer, word
 
 
 def test_a_preference_of_another_problem_is_refused_before_a_mesh_is_found(monkeypatch):
-    monkeypatch.setattr("macs.solvers.solver.search_transcription", never)
+    monkeypatch.setattr("macs.solvers.solver.search_meshes", never)
     with pytest.raises(ValueError, match=r"prefer: .*'f1'.*flight time, horizontal speed"):
         MACS(prefer=MIDDLE).solve(load("goddard"), evaluations=20)
 
