@@ -86,87 +86,58 @@ class Front(Points):
 
         return front_html(self, rendered(front_figure(self), "png", 80))
 
-    def refine_mesh(
+    def refine(
         self,
+        until: float | Transcription | None = None,
         *,
-        tolerance: float = 1e-7,
-        limit: int = 12,
-        more: bool = True,
-        time_limit: float | None = None,
-        progress: bool | None = None,
-    ) -> Front:
-        """The front with each point solved on a mesh of its own, refined until an independent simulation confirms the point.
-
-        Errors are estimated by integration over each element, by states, controls and path constraints between the nodes, by the simulated
-        objectives, and by their change from mesh to mesh. Elements are split where the solution is not smooth; elsewhere states and
-        controls get a higher order; elements that are not needed become one. Where controls switch, elements end, and these ends move.
-        Controls that leave their bounds between nodes are written in the Bernstein basis, whose coefficients bound them. On its new mesh, a
-        point is solved from its old objectives along the front's ranges (Pascoletti and Serafini 1984), so that it keeps its place along
-        the front; an end of the front is solved as such, and where ends move far, the points between them keep their places between these.
-        Intervals of multiple shooting keep their order: they are short where the trajectory bends, and become more where errors ask for it.
-
-        Parameters
-        ----------
-        tolerance : float
-            Largest defect of a state, in units of what it does on the trajectory. In ranges of the front, the objectives may change by ten
-            times this from mesh to mesh, and when simulated. Controls may not leave their bounds at all; states and path constraints by the
-            front's tolerance. Where dynamics are so unstable that no simulation can follow, each element is simulated by itself, and
-            `Point.note` says so.
-        limit : int
-            Largest number of meshes for each point.
-        more : bool
-            Whether there may be more elements, and of higher order. If not, there are as many as before: they move to where the trajectory
-            bends, by a density function. Made for methods with many elements of low order, such as shooting.
-        time_limit : float, optional
-            Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
-        progress : bool, optional
-            Show the progress on stderr. Default: on a terminal and in a notebook, from the third second on.
-
-        Returns
-        -------
-        Front
-            The same number of points, simulated if those of the front were. `Point.note` says why a point does not meet the tolerance, or
-            that it is worse than what its simulation on an earlier mesh achieved;
-            `message` says how many do. Costs are added to those of the front. After Ctrl-C, points are on the meshes reached by then.
-
-        Raises
-        ------
-        ValueError
-            For a black box, a problem that cannot be found, a transcription whose mesh cannot be refined, and invalid arguments.
-        """
-        refined = Front.of(refine_mesh(unmarked(self), tolerance, limit, time_limit, progress, more))
-        return refined.verify(self.stats.get("verify"))
-
-    def polished(
-        self,
-        transcription: Transcription,
-        *,
-        solves: int | None = None,
         limit: int | None = None,
+        more: bool = True,
+        solves: int | None = None,
         verify: float | None = None,
         time_limit: float | None = None,
         progress: bool | None = None,
     ) -> Front:
-        """The front moved to the Pareto front by gradient solves on another transcription.
+        """The front with points solved again by gradients, from their trajectories, on other meshes.
 
-        It works for fronts of any solver and transcription. A search needs candidates that are evaluated quickly, as in single shooting;
-        gradient solves need a sparse problem, such as that of DFET. The solves start from the front's trajectories, interpolated: first the
-        best point of each objective, then points along the front; see `MACS`. Points that no solve improved stay on their own
-        transcription. For an empty front, the solve starts from `closest`.
+        By default, those that a simulation did not confirm; if the front was not simulated, it is now. Each is solved where it misses: on
+        finer meshes of its own; by a method that has none, inside of the limits that it exceeds. This takes at most four tenths of what the
+        front cost, in iterations times variables, or a little where that was little. The others stay as they are. Points that are verified
+        are compared by their simulated objectives; what is still not verified stays only if no verified point is as good.
+
+        With a tolerance, each point is solved on a mesh of its own, refined until an independent simulation confirms it: errors are
+        estimated by integration over each element, by states, controls and path constraints between the nodes, by the simulated
+        objectives, and by their change from mesh to mesh. Elements are split where the solution is not smooth; elsewhere states and
+        controls get a higher order; elements that are not needed become one. Where controls switch, elements end, and these ends move.
+        Controls that leave their bounds between nodes are written in the Bernstein basis, whose coefficients bound them. A point is solved
+        from its old objectives along the front's ranges (Pascoletti and Serafini 1984), so that it keeps its place along the front; an end
+        of the front is solved as such, and where ends move far, the points between them keep their places between these. Intervals of
+        multiple shooting keep their order: they are short where the trajectory bends, and become more where errors ask for it.
+
+        With a transcription, the front is moved to the Pareto front on that. A search needs candidates that are evaluated quickly, as in
+        single shooting; gradient solves need a sparse problem, such as that of DFET. First the best point of each objective is solved, then
+        points along the front; see `MACS`. Points that no solve improved stay on their own transcription. For an empty front, the solve
+        starts from `closest`.
 
         Parameters
         ----------
-        transcription : Transcription
-            Transcription of the gradient solves.
-        solves : int, optional
-            Largest number of gradient solves. Default: the number of points, at least 1.
+        until : float or Transcription, optional
+            A tolerance: the largest defect of a state, in units of what it does on the trajectory. In ranges of the front, the objectives
+            may change by ten times this from mesh to mesh, and when simulated. Controls may not leave their bounds at all; states and path
+            constraints by the front's tolerance. Where dynamics are so unstable that no simulation can follow, each element is simulated by
+            itself, and `Point.note` says so. Or a transcription. Default: until points are verified.
         limit : int, optional
-            Largest number of points of the result, well spread. Default: the number of points.
+            With a tolerance, the largest number of meshes for each point, 12 by default; with a transcription, the largest number of points
+            of the result, well spread, by default as many as there are.
+        more : bool
+            With a tolerance, whether there may be more elements, and of higher order. If not, there are as many as before: they move to
+            where the trajectory bends, by a density function. Made for methods with many elements of low order, such as shooting.
+        solves : int, optional
+            With a transcription, the largest number of gradient solves. Default: the number of points, at least 1.
         verify : float, optional
-            Largest violation, in the constraints' scales, of a point when simulated. A point with more is solved again, at most three
-            times, with its limits tightened by the excess; these solves are additional, and `Point.note` reports them. Points that are
-            still infeasible when simulated are left out, also those of the front itself, and the others are marked as `verify` does.
-            Default: no point is left out; points are marked if those of the front were.
+            With a transcription, the largest violation, in the constraints' scales, of a point when simulated. A point with more is solved
+            again, at most three times, with its limits tightened by the excess; these solves are additional, and `Point.note` reports
+            them. Points that are still infeasible when simulated are left out, also those of the front itself, and the others are marked as
+            `verify` does. Default: no point is left out; points are marked if those of the front were.
         time_limit : float, optional
             Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
         progress : bool, optional
@@ -175,16 +146,36 @@ class Front(Points):
         Returns
         -------
         Front
-            Feasible, mutually non-dominated points. New points have their `optimality`, except those solved with tightened limits. Costs
-            are added to those of the front.
+            Costs are added to those of the front. With a tolerance, the same number of points; `Point.note` says why one does not meet it,
+            or that it is worse than what its simulation on an earlier mesh achieved, and `message` how many do. With a transcription,
+            feasible, mutually non-dominated points; new ones have their `optimality`, except those solved with tightened limits.
 
         Raises
         ------
         ValueError
-            For a black box, a problem that cannot be found, peaks without derivatives, and invalid arguments.
+            For a black box, a problem that cannot be found, a transcription whose mesh cannot be refined, peaks without derivatives, and
+            invalid arguments.
         """
-        found = Front.of(polished(self, transcription, solves, limit, verify, time_limit, progress))
-        return found.verify(self.stats.get("verify") if verify is None else verify)
+        if until is None:
+            marked = self if self.was_simulated.any() else self.verify()
+            return Front.of(mended(marked, marked.stats["verify"], time_limit, progress))
+        if isinstance(until, Transcription):
+            found = Front.of(polished(self, until, solves, limit, verify, time_limit, progress))
+            return found.verify(self.stats.get("verify") if verify is None else verify)
+        refined = Front.of(refine_mesh(unmarked(self), until, 12 if limit is None else limit, time_limit, progress, more))
+        return refined.verify(self.stats.get("verify"))
+
+    def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 12, more: bool = True, **limits: Any) -> Front:
+        """Each point on a mesh of its own: `refine` until a tolerance."""
+        return self.refine(tolerance, limit=limit, more=more, **limits)
+
+    def polished(self, transcription: Transcription, **limits: Any) -> Front:
+        """The front moved to the Pareto front on another transcription: `refine` on that."""
+        return self.refine(transcription, **limits)
+
+    def mended(self, **limits: Any) -> Front:
+        """The points that a simulation did not confirm, solved again: `refine`."""
+        return self.refine(**limits)
 
     def verify(self, tolerance: float | None = VERIFY) -> Front:
         """The same points, simulated by an independent integrator, and marked by whether they are as they say.
@@ -211,34 +202,6 @@ class Front(Points):
             For a tolerance that is not positive, and a problem that cannot be found.
         """
         return verified(self, tolerance)
-
-    def mended(self, *, time_limit: float | None = None, progress: bool | None = None) -> Front:
-        """The front with those points solved again that a simulation did not confirm; if it was not simulated, it is now.
-
-        Each is solved where it misses: on finer meshes of its own; by a method that has none, inside of the limits that it exceeds. This
-        takes at most four tenths of what the front cost, in iterations times variables, or a little where that was little. The others
-        stay as they are. Points that are verified are compared by their simulated objectives; what is still not verified stays only if no
-        verified point is as good.
-
-        Parameters
-        ----------
-        time_limit : float, optional
-            Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
-        progress : bool
-            Show the progress on the terminal.
-
-        Returns
-        -------
-        Front
-            Costs are added to those of the front.
-
-        Raises
-        ------
-        ValueError
-            For a black box, and a problem that cannot be found.
-        """
-        marked = self if self.was_simulated.any() else self.verify()
-        return Front.of(mended(marked, marked.stats["verify"], time_limit, progress))
 
     def simulate(
         self,

@@ -77,15 +77,6 @@ def test_both_methods_lie_on_one_curve() -> None:
 
 
 @pytest.mark.slow
-def test_a_point_found_by_limits_is_found_by_descent() -> None:
-    problem, mesh = compiled("orbit_rise"), DFET(8, 2)
-    limited = sweep(problem, mesh, points=5, method="epsilon", starts=1)
-    fine = sweep(problem, mesh, points=101, start=limited, starts=1)
-    assert distances(limited, fine.objectives).max() < 1e-4
-    assert fine.stats["failures"] == {} and len(fine) == 101
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["orbit_rise", "orbit_rise_full"])
 def test_orbit_rise_is_what_its_mesh_can_be(name: str) -> None:
     front = sweep(load(name), DFET(30, 1), points=10, starts=1)
@@ -141,27 +132,10 @@ def test_payoff_is_lexicographic_in_the_declared_order() -> None:
     assert certificates(ends).max() < 1e-6
 
 
-def test_payoff_keeps_the_declared_order_where_the_first_is_maximised() -> None:
-    problem = Problem("rise and rest")
-    phase = problem.phase("run", t0=0, tf=(1, 3))
-    x = phase.state("x", bounds=(-9, 9), initial=0)
-    u = phase.control("u", bounds=(-1, 1))
-    phase.dynamics(x=u)
-    problem.maximize("height", phase.final(x))
-    problem.minimize("time", phase.tf)
-    ends = payoff(problem, MESH)
-    assert ends.objectives == pytest.approx(np.array([[3, 3], [1, 1]]), abs=1e-6)
-
-
 def test_ends_of_smooth_fronts_are_not_rounded_off() -> None:
     # Where a front is steep, a slack of 1e-9 in one objective would be 3e-5 in the other.
     ends = payoff(slide(), MESH, starts=1)
     assert ends.objectives == pytest.approx(np.array([[0, 1], [0.5, 0]]), abs=1e-6)
-
-
-@pytest.mark.slow
-def test_three_ends() -> None:
-    assert payoff(corners(), MESH).objectives == pytest.approx(2 * (1 - np.eye(3)), abs=1e-6)
 
 
 @pytest.mark.slow
@@ -192,13 +166,6 @@ def test_several_starts_find_the_deeper_valley() -> None:
 
 
 @pytest.mark.slow
-def test_a_guess_is_the_first_start() -> None:
-    problem = two_valleys()
-    problem.guess(p=-0.9)
-    assert optimize(problem, MESH).parameters["p"] == pytest.approx(-1, abs=1e-2)
-
-
-@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bits_and_the_costs() -> None:
     one, two = (sweep(shuttle(), MESH, points=4, starts=2, seed=3) for _ in range(2))
     assert np.array_equal(one.decision, two.decision) and one.stats["seed"] == 3
@@ -210,12 +177,6 @@ def test_the_same_seed_gives_the_same_bits_and_the_costs() -> None:
 def test_a_front_is_a_start_for_another() -> None:
     begun = sweep(load("goddard"), DFET(4, 6), points=6, start=goddard(), starts=1)
     assert len(begun) == 6 and begun.stats["inner_iterations"] < goddard().stats["inner_iterations"]
-
-
-def test_certificates_are_saved(tmp_path) -> None:
-    front = sweep(two_wells(), MESH, points=3, starts=1)
-    front.save(tmp_path / "front.nc")
-    assert certificates(Front.load(tmp_path / "front.nc")) == pytest.approx(certificates(front))
 
 
 # What is not there

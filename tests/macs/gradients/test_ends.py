@@ -93,19 +93,6 @@ def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch
     assert power == 4 or (end is one and solver.solves.counts.gradient_solves == before + 2)
 
 
-def test_a_solve_whose_iterations_ran_out_goes_on_where_much_was_gained():
-    solver = solver_of_two_valleys()
-    start = solver.nlp.first_guess(np.zeros((1, len(solver.nlp.free))))[0]
-    task = Scalarised.single(1, 2)
-    with solver.solves.at_most(3):
-        short = solver.from_vector(start, task)
-    assert short.status == "failed" and short.iterations == 3
-    assert ends._gone_on(solver, short, short.F[1] - 1e-3, task) is short
-    on = ends._gone_on(solver, short, short.F[1] + 1e-3, task)
-    assert on.status == "converged" and on.F[1] < short.F[1]
-    assert ends._gone_on(solver, on, np.inf, task) is on
-
-
 @pytest.mark.slow
 def test_what_is_least_stays_so_where_a_slack_would_gain_more_than_its_multiplier_says():
     """A quick drive around an obstacle, whose effort falls with less than the root of the time that is lost."""

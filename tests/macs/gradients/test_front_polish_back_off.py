@@ -6,8 +6,6 @@ Bryson and Ho, "Applied Optimal Control", 1975, section 3.11: least effort is 4 
 from __future__ import annotations
 
 import signal
-import time
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -17,8 +15,7 @@ from smooth_problems import bryson_denham
 from macs import MACS, Front
 from macs.evaluation.bilevel import Bilevel
 from macs.gradients import front_polish
-from macs.gradients.front_polish import back_off, feasible_when_simulated
-from macs.io import interrupts
+from macs.gradients.front_polish import back_off
 from problems import Problem
 from transcription import DFET, SingleShooting
 from transcription.inner import Propagate
@@ -75,24 +72,6 @@ def test_points_that_cannot_be_made_feasible_are_marked():
     assert len(none) == len(feasible) == len(moved) == 0
 
 
-def test_known_points_are_simulated_only_if_it_matters(rough, monkeypatch):
-    counts, simulated = [], front_polish.simulated
-
-    def counted(points, *arguments):
-        counts.append(len(points))
-        return simulated(points, *arguments)
-
-    monkeypatch.setattr(front_polish, "simulated", counted)
-    dominating = rough.F.min(axis=0)[None] - 1.0
-    assert len(feasible_when_simulated(dominating, rough, VERIFY)[0]) == len(rough) and not counts
-    nothing = np.empty((0, 2))
-    kept, unseen = feasible_when_simulated(nothing, rough, VERIFY)
-    assert not unseen
-    assert sum(counts) == len(rough)
-    actual = rough.simulate(tolerance=VERIFY)
-    assert np.array_equal(kept.F, rough.F[actual.status == "converged"])
-
-
 def test_margins_keep_rows_inside(rough):
     nlp = COARSE.transcribe(bryson_denham())
     evaluator = Bilevel(nlp, Propagate(), 1e-6)
@@ -134,11 +113,6 @@ def test_what_makes_no_sense_is_refused(rough):
         rough.polished(COARSE, verify=0)
 
 
-def test_without_a_terminal_not_every_solve_is_shown(rough, capsys):
-    rough.polished(COARSE, solves=12, verify=VERIFY, progress=True)
-    assert 0 < capsys.readouterr().err.count("polish: ") < 6
-
-
 class TestOfASearch:
     """MACS searches on one transcription and polishes on another."""
 
@@ -157,20 +131,6 @@ class TestOfASearch:
         problem, kept = bryson_denham(), tmp_path / "kept"
         first, again = (solver.solve(problem, SHOOTING, evaluations=400, seed=1, checkpoint=kept) for _ in range(2))
         assert np.array_equal(first.F, again.F) and any(point.transcription == COARSE.to_dict() for point in again)
-
-    def test_its_time_limit_is_for_both(self, monkeypatch):
-        solve, late = Bilevel._descend, SimpleNamespace(perf_counter=lambda: time.perf_counter() + 1000.0)
-
-        def refine(self, *arguments):
-            found = solve(self, *arguments)
-            monkeypatch.setattr(interrupts, "time", late)
-            return found
-
-        monkeypatch.setattr(Bilevel, "_descend", refine)
-        solver = MACS(polish_on="dfet:3x3", polish_every=20)
-        found = solver.solve(bryson_denham(), SHOOTING, evaluations=400, seed=1, verify=VERIFY, time_limit=600.0)
-        assert found.stats["evaluations"] == 400 and found.stats["stopped"] == "time limit" and not found.stats["reproducible"]
-        assert len(found) and found.stats["gradient_solves"] == 1, "of twenty, and more"
 
     @pytest.mark.parametrize(
         ("settings", "words"),

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from macs import optimize, payoff, sweep
+from macs import optimize, payoff
 from macs.gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Starts, is_least
 from macs.gradients.scalarised import GradientSolves, Scalarised
 from problems import Problem, load
@@ -125,14 +125,6 @@ def test_a_front_to_start_from_is_never_made_worse():
     best = payoff(problem, DFET(1, 1))
     again = payoff(problem, DFET(1, 1), start=best, starts=1)
     assert again.F[0, 0] <= best.F[0, 0] + 1e-9 and again.F[1, 1] <= best.F[1, 1] + 1e-9
-
-
-@pytest.mark.slow
-def test_a_sweep_with_one_start_and_with_as_many_as_pay_agree_where_there_is_one_valley():
-    goddard = load("goddard")
-    one, many = (sweep(goddard, points=5, starts=starts) for starts in (1, "auto"))
-    assert np.abs(many.F - one.F).max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6 * np.ptp(one.F[:, 0]))
-    assert set(many.stats["optima"].values()) == {1} and "starts" in one.solver["settings"]
 
 
 def bounded(**objectives) -> Problem:

@@ -50,15 +50,6 @@ def test_layers_at_equal_numbers_of_intervals():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("case", "count", "share"), [("van_der_pol", 40, 0.3), ("rayleigh", 40, 0.3)])
-def test_other_states_at_equal_numbers_of_intervals(case, count, share):
-    problem = load(f"standard/{case}")
-    even, dense = refined(problem, MultipleShooting(count, control="linear"), more=False, limit=3)
-    assert [mesh.elements for mesh in method_of(dense).meshes.values()] == [count]
-    assert defect(problem, dense) < share * defect(problem, even)
-
-
-@pytest.mark.slow
 def test_elements_of_other_methods_move_too():
     problem = load("standard/van_der_pol")
     even, dense = refined(problem, DFET(20, 2), more=False, limit=2)

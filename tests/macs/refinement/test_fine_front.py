@@ -68,10 +68,6 @@ def test_asked_to_end_points_stay_as_they_were(coarse):
         assert solved(coarse, [0, 1, 2, 3, 4]).trajectories == coarse.trajectories
 
 
-def test_nothing_is_solved_for_no_rows(coarse):
-    assert solved(coarse, []) is coarse
-
-
 def test_programs_that_a_search_has_are_not_made_again():
     problem = cart().compile()
     programs = Programs(problem)
@@ -79,14 +75,6 @@ def test_programs_that_a_search_has_are_not_made_again():
     searched = DFET(2, 3)
     assert Programs(problem)(searched) is not searched.nlp(problem), "without a search nothing is kept for good"
     assert programs(searched) is searched.nlp(problem) and programs.built == len(FINE.nlp(problem).variables)
-
-
-@pytest.mark.parametrize("kept", [1, 2])
-def test_only_the_latest_programs_are_kept(kept):
-    programs, other = Programs(cart().compile(), kept), DFET(2, 3)
-    first = programs(FINE)
-    programs(other)
-    assert (programs(FINE) is first) == (kept == 2)
 
 
 # Places between the ends

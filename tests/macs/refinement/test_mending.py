@@ -11,10 +11,8 @@ from macs.fronts import verified
 from macs.fronts.verified import unmarked
 from macs.gradients.front_polish import KEPT_INSIDE
 from macs.refinement import mending
-from macs.refinement.front_refinement import FrontRefinement
 from problems import Problem, load
 from transcription import DFET, SingleShooting
-from transcription.meshes.verdict import Wanted
 
 MESH = DFET(4, 6)
 LEAST = np.sqrt(2.0 * 10.0 * (1.0 / (4e-3 - 1.6e-3) + 1.0 / (4e-3 + 1.6e-3)))
@@ -63,27 +61,10 @@ def test_points_that_are_verified_stay_as_they_are(marked, mended):
     assert again.stats["gradient_solves"] == mended.stats["gradient_solves"]
 
 
-@pytest.mark.parametrize("enough", [True, False])
-def test_no_further_mesh_is_tried_once_a_point_is_good_enough(marked, enough):
-    wanted = Wanted(1e-9, feasible=1e-9)
-    job = FrontRefinement(marked, wanted, 2, [0], enough=lambda point: enough)
-    job.go()
-    assert len(job.found[0].meshes) == (1 if enough else 2)
-    assert (job.found[0].best.method == job.found[0].meshes[0]) >= enough
-
-
-def test_what_is_verified_has_no_complaint_about_its_mesh(mended):
-    assert [point.note for point in mended] == ["", "", ""]
-
-
 def test_the_work_is_counted(marked, mended):
     assert mended.stats["gradient_solves"] > marked.stats["gradient_solves"] and mended.stats["work"] > marked.stats["work"] > 0
     assert mended.stats["wall_time"] > marked.stats["wall_time"] and mended.stats["verify"] == marked.stats["verify"]
     assert mended.solver == marked.solver and mended.message == marked.message
-
-
-def test_the_same_bits_again(marked, mended):
-    np.testing.assert_array_equal(marked.mended().F, mended.F)
 
 
 def test_without_time_points_are_left_as_they_are(marked):

@@ -107,7 +107,7 @@ def random_problem(seed: int) -> Problem:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(12))
 def test_random_fronts_keep_what_came_in(seed: int) -> None:
     """A refined front has its size, its ends and its spread, and what has no note is right, and no worse than what it was refined from."""
     rng = np.random.default_rng(seed + 1000)
@@ -167,21 +167,6 @@ def test_what_is_worse_than_it_was_when_simulated_is_no_success():
     better = loop.refine(replace(begun, achieved=0.9 * honest.best.F), task)
     assert better.worse == pytest.approx(0.1 * honest.best.F[0] / task.units[0], rel=0.05)
     assert "it is worse by" in better.note and "when simulated" in better.note
-
-
-@pytest.mark.parametrize("fails", ["lobatto", "bernstein"])
-def test_where_solves_fail_in_one_basis_the_other_is_tried(monkeypatch, fails):
-    plain, tried = GradientSolves.__call__, []
-
-    def solve(self, nlp, *arguments):
-        found = plain(self, nlp, *arguments)
-        tried.append(nlp.transcription.basis)
-        return replace(found, status="failed") if nlp.transcription.basis == fails and nlp.transcription.mesh else found
-
-    loop, begun, task = begun_on(DFET(8, 4, basis=fails), layers(1.5, 1.0, 5.0, 50.0), Wanted(1e-5, 1e-6))
-    monkeypatch.setattr(GradientSolves, "__call__", solve)
-    found = loop.refine(begun, task)
-    assert fails in tried and found.best.method.basis != fails and found.complaints() == []
 
 
 @pytest.mark.slow

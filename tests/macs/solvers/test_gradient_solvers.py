@@ -9,7 +9,6 @@ from macs import payoff, sweep
 from macs.solvers.checkpoint import keeps
 from macs.solvers.solver import solver
 from problems import load
-from runs.cli import main
 from transcription import parse
 
 METHOD = parse("dfet:4x4")
@@ -40,14 +39,6 @@ def test_the_best_of_one_objective(goddard):
 
 
 @pytest.mark.slow
-def test_without_an_optimum_the_front_is_empty():
-    problem = load("goddard")
-    problem.constraint("nowhere", problem.phases["ascent"].final(problem.phases["ascent"]["y"]), lower=11.0, scale=1.0)
-    front = solver("optimum").solve(problem, METHOD, seed=0)
-    assert len(front) == 0 and front.closest is not None and "no solve converged" in front.message
-
-
-@pytest.mark.slow
 def test_meshes_follow_on_request(goddard):
     method = parse("multiple-shooting:8:linear")
     fixed, dense = (solver("payoff", starts=1, mesh=mesh).solve(goddard, method, seed=0) for mesh in ("fixed", "density"))
@@ -55,13 +46,6 @@ def test_meshes_follow_on_request(goddard):
     assert not fixed.verified[0] and mended.verified.all()
     meshes = [one.trajectory["ascent"].state.edges for one in (fixed[0], dense[0])]
     assert len(meshes[0]) == len(meshes[1]) and np.ptp(np.diff(meshes[1])) > 1.0 > np.ptp(np.diff(meshes[0]))
-
-
-def test_a_start_is_used(goddard):
-    known = solver("payoff", starts=1).solve(goddard, METHOD, seed=0)
-    again = solver("payoff", starts=1).solve(goddard, METHOD, seed=0, start=known)
-    assert again.stats["inner_iterations"] < known.stats["inner_iterations"]
-    np.testing.assert_allclose(again.objectives, known.objectives, rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -85,9 +69,3 @@ def test_plain_functions_are_refused():
 
 def test_no_checkpoint_keeps_them():
     assert not keeps(solver("payoff", starts=1))
-
-
-@pytest.mark.slow
-def test_on_the_command_line(tmp_path, capsys):
-    assert main(["solve", "goddard", "--solver", "payoff", "--seed", "1", "--out", str(tmp_path / "ends.nc")]) == 0
-    assert "2 points" in capsys.readouterr().out
