@@ -159,11 +159,11 @@ class Front(Points):
         if until is None:
             marked = self if self.was_simulated.any() else self.verify()
             return Front.of(mended(marked, marked.stats["verify"], time_limit, progress))
-        if isinstance(until, Transcription):
-            found = Front.of(polished(self, until, solves, limit, verify, time_limit, progress))
-            return found.verify(self.stats.get("verify") if verify is None else verify)
-        refined = Front.of(refine_mesh(unmarked(self), until, 12 if limit is None else limit, time_limit, progress, more))
-        return refined.verify(self.stats.get("verify"))
+        if isinstance(until, int | float):
+            refined = refine_mesh(unmarked(self), until, 12 if limit is None else limit, time_limit, progress, more)
+            return Front.of(refined).verify(self.stats.get("verify"))
+        found = Front.of(polished(self, until, solves, limit, verify, time_limit, progress))
+        return found.verify(self.stats.get("verify") if verify is None else verify)
 
     def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 12, more: bool = True, **limits: Any) -> Front:
         """Each point on a mesh of its own: `refine` until a tolerance."""
