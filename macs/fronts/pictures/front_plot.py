@@ -20,6 +20,7 @@ from .style import (
     NOT_FEASIBLE,
     NOT_SIMULATED,
     NOT_VERIFIED,
+    about,
     axis_label,
     axis_number,
     better,
@@ -147,9 +148,9 @@ def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
     for axis, goal in zip("xyz" if not third else "xy", goals, strict=False):
         getattr(ax, f"set_{axis}label")(better(goal) if goal in front.goals else goal.name)
     for axis, column in zip("xyz", axes, strict=False):
-        about = _about(column) if len(column) > 1 else None
-        if about:
-            getattr(ax, f"set_{axis}lim")(*about)
+        ends = _about(column) if len(column) > 1 else None
+        if ends:
+            getattr(ax, f"set_{axis}lim")(*ends)
     for i, edge in zip(marked, COLORS, strict=False):
         ax.scatter(*axes[:, [i]], zorder=4, label=_values(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
     if len(front.goals) == 2 and good.sum() > 1 and not len(marked):
@@ -170,8 +171,7 @@ def _about(values: np.ndarray) -> tuple[float, float] | None:
     size = float(np.abs(finite).max(initial=0.0))
     if not len(finite) or np.ptp(finite) > EQUAL_OBJECTIVES * size:
         return None
-    half = 0.1 * size or 1.0
-    return float(finite.min()) - half, float(finite.max()) + half
+    return about(float(finite.min()), float(finite.max()))
 
 
 def _value(front: Any, number: int, k: int) -> str:

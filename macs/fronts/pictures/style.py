@@ -316,5 +316,10 @@ def _around(low: float, high: float, limits: Sequence[Limits]) -> tuple[float, f
     # One that is small beside its bounds could not be read within these, unless it is zero.
     if both and (size >= 0.05 * span or size <= ROUND_OFF * span):
         return min(low, *(lower for lower, _ in both)), max(high, *(upper for _, upper in both))
-    half = 0.1 * size or 1.0
+    return about(low, high)
+
+
+def about(low: float, high: float) -> tuple[float, float]:
+    """A range in which a constant, of values between these, looks constant."""
+    half = 0.1 * max(abs(low), abs(high)) or 1.0
     return low - half, high + half
