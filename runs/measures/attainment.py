@@ -70,7 +70,7 @@ def attainment(fronts: Sequence[Points]) -> Attainment:
 
 
 def staircase(corners: np.ndarray, signs: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """The border (q, 2) of the region that the corners (p, 2) of a surface dominate, for drawing. signs (2,), ends (2,)."""
+    """The border (q, 2) of the region that the corners (p, 2) of a surface dominate, up to `ends` (2,), for drawing."""
     F = corners * signs
     F = F[np.lexsort(F.T[::-1])]
     worst = np.asarray(ends) * signs
@@ -98,7 +98,7 @@ def band(histories: Sequence[History], *, larger: bool = False, moments: int = 4
     """The band of several runs, each with samples of its own.
 
     A run keeps its last value until its next sample, and for good after its end. Before its first sample, and where its value is NaN or
-    infinite, it has failed, which is worse than any value. histories (k,).
+    infinite, it has failed, which is worse than any value.
     """
     runs = [(np.asarray(x, dtype=float), np.asarray(y, dtype=float)) for x, y in histories]
     if not runs:

@@ -38,7 +38,7 @@ ReferenceKey = Annotated[
 
 
 def union(fronts: Sequence[Points]) -> Points:
-    """The non-dominated points of several fronts: the reference of a problem whose true front is not known. fronts (n, m)."""
+    """The non-dominated points of several fronts: the reference of a problem whose true front is not known."""
     if not len(fronts):
         raise ValueError("there is no front to take the union of")
     goals = goals_of(fronts)

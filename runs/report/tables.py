@@ -98,9 +98,8 @@ class Table:
 
     def markdown(self) -> str:
         """A table in Markdown, with its caption above and its notes below."""
-        heads = [label(column.title, column.unit) for column in self.columns]
-        cells = [[_text(cell, column.digits) for cell, column in zip(row, self.columns, strict=True)] for row in self._shown()]
-        rule = [":---" if left else "---:" for left in self._left()]
+        heads, cells, left = self.shown()
+        rule = [":---" if flush else "---:" for flush in left]
         rows = [heads, rule, *cells]
         lines = ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in rows]
         above = [f"**{self.caption}**", ""] if self.caption else []
