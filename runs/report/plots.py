@@ -170,7 +170,7 @@ def convergence_figure(
             ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)
         else:
             ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
-        ax.set(xlim=(0, last), xlabel=xlabel, ylabel=ylabel)
+        ax.set(xlim=(0, last or 1.0), xlabel=xlabel, ylabel=ylabel)
         legend(figure, ax, "median, quartiles")
     return figure
 
