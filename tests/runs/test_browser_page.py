@@ -173,7 +173,7 @@ def test_rounded_values_differ_by_a_millionth_of_their_range(values):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("browser") / "out"
-    solvers = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
+    solvers = {"one": Plain(), "other": Plain(agents=6), "broken": Crashing()}
     Study("gliders", problems=glide(), solvers=solvers, evaluations=60, runs=2, seed=1).run(out, executor=Inline())
     return out
 

@@ -24,7 +24,7 @@ from runs.report.published import published_tables
 from runs.report.report import _Writer, report
 from runs.report.tables import table
 
-SOLVERS = {"one": Plain(), "other": Plain(breeding=0.0), "broken": Crashing()}
+SOLVERS = {"one": Plain(), "other": Plain(agents=6), "broken": Crashing()}
 WORDS = {"source": "a paper", "note": "thirty runs", "differs": "{runs} instead of thirty"}
 ROW = {"problem": "glide", "by": "the paper"}
 GOAL = {"objective": "distance", "best": 20.0, "worst": 0.0}
