@@ -149,10 +149,12 @@ def test_a_start_is_evaluated_first_and_too_many_are_thinned():
     assert outside.agents.Z.max() == 2.0
 
 
-def test_of_too_many_starts_the_best_become_agents():
+def test_of_too_many_starts_the_best_become_agents(monkeypatch):
+    monkeypatch.setattr("macs.search.macs.assign", lambda *state: None)  # which moves agents to the archive
+
     def begun(start, agents):
         box = boxed(lambda X: X, [(-9, 9)] * 2, constraints=lambda X: -X[:, 0] - 1)
-        state = MACS(agents=agents, variant=Variant(redraw=False)).begin(box, 100, np.random.default_rng(0), np.array(start, dtype=float))
+        state = MACS(agents=agents).begin(box, 100, np.random.default_rng(0), np.array(start, dtype=float))
         return state.agents.Z.tolist()
 
     infeasible = [[-9, 0], [-3, 0], [-5, 0]]
