@@ -2,7 +2,7 @@
 
 The agents are few, and each searches near its own position. The archive covers the whole front, and the differences of its points lead
 along the front: crossover exchanges coordinates between two points, and the difference of two points is a step for a third. Crossover suits
-separable problems with many local fronts, differences suit coupled variables.
+separable problems with many local fronts, differences suit coupled variables. So that is used more often whose offspring the archive keeps.
 
 As long as nothing is feasible the archive is empty, and the least violated points are bred likewise: they are ordered by one number, and a
 generation of children with coordinates of both parents lowers it sooner than steps of single agents. Parents are then the better of two
@@ -26,6 +26,8 @@ FEW_MATES = 4
 """An archive of at most so many points is too small for mates: the agents are mates too."""
 NEAREST_MATES = 20
 """Mates are mostly drawn from so many nearest points (Zhang and Li 2007; Li and Zhang 2009)."""
+LEAST_SHARE = 0.05
+"""Least share of crossover, and of differences, so that it can succeed later."""
 DIFFERENCE_WEIGHT = 0.5
 """Weight of the difference of two mates (Li and Zhang 2009)."""
 
@@ -35,7 +37,8 @@ class Breeding:
     """How offspring are made. Indices are those of distributions: a higher one puts offspring nearer to their parents (Deb and Agrawal
     1995)."""
 
-    differences: float = 0.5  # part of the children that are made by differences, the others by crossover
+    # Part of the children that are made by differences, the others by crossover; None: by what the archive has kept of both.
+    differences: float | None = None
     wide: float = 0.3  # probability that mates are drawn from the whole pool instead of the nearest points
     crossover: float = 15.0  # index
     from_mate: float = 0.25  # part of the crossed coordinates in which a child is near the mate
@@ -100,12 +103,16 @@ def mutate(X: np.ndarray, rng: np.random.Generator, index: float) -> np.ndarray:
     return X + np.where(rng.random(X.shape) < 1.0 / X.shape[1], np.copysign(size, u - 0.5), 0.0)
 
 
-def breed(box: UnitBox, X: np.ndarray, pool: np.ndarray, how: Breeding, rng: np.random.Generator) -> np.ndarray:
-    """One offspring (k, d) of each parent at X (k, d), with mates of the pool (p, d)."""
+def breed(
+    box: UnitBox, X: np.ndarray, pool: np.ndarray, how: Breeding, share: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """One offspring (k, d) of each parent at X (k, d), with mates of the pool (p, d), and the mask (k,) of the share that differences
+    have made."""
     others = mates(box, X, pool, rng, how.wide)
-    by_difference = rng.random((len(X), 1)) < how.differences
+    differs = rng.random(len(X)) < share
     crossed = crossover(box, X, others, rng, how.crossover, how.from_mate)
-    return box.put_back(mutate(np.where(by_difference, difference(box, X, others, rng), crossed), rng, how.mutation))
+    children = np.where(differs[:, None], difference(box, X, others, rng), crossed)
+    return box.put_back(mutate(children, rng, how.mutation)), differs
 
 
 def breed_archive(trials: Trials) -> None:
@@ -126,5 +133,13 @@ def breed_archive(trials: Trials) -> None:
     points = box.to_unit(parents.Z[:, evaluator.free])
     pool = points if len(points) > FEW_MATES else np.vstack([points, trials.positions()])
     how = INFEASIBLE_POINTS if not feasible else ALONG_CURVE if m <= CURVE else ON_SURFACE if m <= MANY else MANY_OBJECTIVES
-    trials.evaluate(parents.Z[rows], points[rows], breed(box, points[rows], pool, how, rng))
+    rates = state.operators.rates(prior=0.1)
+    share = LEAST_SHARE + (1.0 - 2.0 * LEAST_SHARE) * rates[1] / rates.sum() if how.differences is None else how.differences
+    children, differs = breed(box, points[rows], pool, how, share, rng)
+    bred, result = trials.evaluate(parents.Z[rows], points[rows], children)
     update_archives(state, trials.seen, settings, evaluator)
+    if result is not None and how.differences is None:
+        # A copy of a known point, as where only coordinates changed that no objective depends on, is no success.
+        kept = state.archive.joined(state.infeasible).has(result.F) & ~parents.has(result.F)
+        made = np.stack([~differs[bred], differs[bred]])
+        state.operators.add((made & kept).sum(axis=1), made.sum(axis=1))

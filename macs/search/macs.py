@@ -103,6 +103,7 @@ class MACS(Settings, Solver):
             nadir=np.full(m, np.nan),
             directions=directions.pool(m, self.directions_to_draw_from(m)),
             samples=ResidualSamples.none(d),
+            operators=Credit.equal(2),
             repairs=Credit.equal(2),
             undirected=Credit(np.zeros(2), np.zeros(2)),
             excess=0.0,

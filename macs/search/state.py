@@ -159,6 +159,7 @@ class SearchState:
     nadir: np.ndarray  # (m,): worst values in the archive
     directions: np.ndarray  # (k, m): pool from which the directions of the agents are drawn
     samples: ResidualSamples  # the last points with the residuals of all constraints, for `repair`
+    operators: Credit  # of crossover, and of differences in the second row: offspring that stayed in the archive, and all of them
     repairs: Credit  # of steps of repair, in the second row, and of all other evaluations
     undirected: Credit  # of agents with a direction, and without one in the second row: what they gained in evaluations
     excess: float  # evaluations that agents without a direction have had beyond their share, at least 0

@@ -16,8 +16,8 @@ from macs.io.console import Steps
 from macs.pareto import archive as archives
 from macs.pareto.dominance import nondominated
 from macs.pareto.spread import dominated_volume
+from macs.search import breeding, repair
 from macs.search import macs as search
-from macs.search import repair
 from macs.search.settings import Variant
 from macs.search.state import Credit
 from problems import load
@@ -57,6 +57,7 @@ GENERAL: dict[str, Switch] = {
     "directions are drawn again": variant(redraw=False),
     "fewer coordinates": variant(adaptive_coordinates=False),
     "breeding": variant(breeding=False),
+    "credit of breeding": patched(breeding, "LEAST_SHARE", 0.5),
 }
 VOLUME: dict[str, Switch] = {"volume in the archive": patched(archives, "swap_by_hypervolume", lambda F, chosen, *rest: chosen)}
 ALPHA: dict[str, Switch] = {"alpha-dominance": patched(archives, "alpha_nondominated", lambda F: np.ones(len(F), dtype=bool))}
