@@ -47,6 +47,7 @@ generation  how the time of a generation of NSGA-III grows with individuals, nod
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 many        DTLZ with 5 and 8 objectives, likewise: distance from the front, hypervolume
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
+parts       MACS without one of its parts at a time, on problems that nothing was tuned on: hypervolume, time, number of problems solved
 peers       the examples of YAPSS, from statement to solution, here, in YAPSS and in rockit: pip install 'macs-trajectories[peers]'
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
 prefer      MACS guided by a preference against an even one, in the region of interest, at equal evaluations

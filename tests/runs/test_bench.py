@@ -462,3 +462,13 @@ def test_generations_grow_as_their_work_does(monkeypatch):
     (row,) = measured("generation", growth.Series("quadratic", "things", prepare, (20, 40, 80), "Np^2", 2))
     assert row.of("exponent") == pytest.approx(2.0) and row.of("seconds") == pytest.approx(5e-6 * 6400)
     assert "section IV-D" in BENCHES["generation"].report([row])
+
+
+def test_parts_are_off_one_at_a_time():
+    """From the same seeds: a part that does nothing within the budget has no gain."""
+    case = next(one for one in BENCHES["parts"].full.cases if one.name == "TNK")
+    rows = measured("parts", case, rounds=2, evaluations=120)
+    assert {row.case for row in rows} == {"constraints"} and len({row.who for row in rows}) == len(rows) > 5
+    gains = {row.who: row.values["gain"] for row in rows}
+    assert gains["signs of residuals"] == [0.0, 0.0], "none of its limits is on an absolute value"
+    assert any(gain != [0.0, 0.0] for gain in gains.values())

@@ -125,7 +125,7 @@ def test_only_the_violation_counts_as_long_as_nothing_is_feasible():
     none = np.empty((0, 2))
 
     def later(known, violation, evaluations):
-        return next_round(known, none, none, violation, EVERY, evaluations, 0, True, False, 10**6)
+        return next_round(known, none, none, violation, EVERY, evaluations, evaluations * int(WORK.little), True, False, 10**6)
 
     first = later(Rounds.first(2, True, 10**6), 1.0, FIRST)
     assert first.improved == FIRST and not len(first.front)
