@@ -256,9 +256,6 @@ class MeshSearch:
                 if not self.tasks[-1].all:
                     raise
                 break
-            if self._ends and self.loop.most_work is None:
-                # What is begun on the first mesh is ended; others are limited.
-                self.loop.most_work = len(self.tasks) * WORK.most
             self.exhausted = self.loop.most_work is not None and self.loop.work >= self.loop.most_work
             if self._enough:
                 break
@@ -307,6 +304,9 @@ class MeshSearch:
 
         self.coarse[method] = best = lexicographic_ends(solver, single) if self._ends else [single(0)]
         self._hopeless += solver.closest is not None
+        if self._ends and self.loop.most_work is None:
+            # Ends on the first mesh are sought however long that takes; refining them, and other meshes, are limited.
+            self.loop.most_work = self.loop.work + len(self.tasks) * WORK.most
         for optima, one, other, rule in zip(self.tasks, first, best, rules, strict=True):
             if optima.all and optima.best.good:
                 continue
