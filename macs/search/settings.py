@@ -131,24 +131,27 @@ class Settings:
         Use derivatives, if the problem has them (a black box has none): gradient solves of single agents during the search, one for 200
         evaluations, and a polish of the archive at its end, see `polish_every`. Points then have their `optimality`.
         `stats["gradient_solves"]` counts all solves.
-    polish_on : str, optional
-        Another transcription for all gradient solves, such as "dfet:30x3:bernstein:1": search where candidates are evaluated quickly
-        (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
-        agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
-        polished again each time.
     mesh : {"mended", "fixed", "adaptive"}, default "mended"
         What is done after the search, unless it was ended by Ctrl-C, a time limit or a callback, for optimal control problems. "mended":
         points that a simulation does not confirm are solved again on finer meshes, see `Front.mended`. "fixed": all points stay on the mesh
         of the search. "adaptive": each point is solved on a mesh of its own until a simulation confirms it, see `Front.refine_mesh`.
         With `refine=False` points are not mended.
-    mesh_tolerance : float, default 1e-7
-        With `mesh="adaptive"`: largest difference between a simulated state and that of the transcription, in spans of its bounds, in
-        [1e-10, 1].
     prefer : Preference or dict, optional
         What you want of the objectives, see `macs.decisions`, or as plain data: the search goes where it is good. The archive is dense in
         the region of interest, where the value of the preference is within a twentieth of its spread along the front from the best, and
         sparse elsewhere, with the ends of the front; so are the directions of agents and gradient solves. As long as the front at hand does
         not reach the values that the preference names, points are spread uniformly; in the end `stats["prefer"]` says so.
+
+    Other Parameters
+    ----------------
+    polish_on : str, optional
+        Another transcription for all gradient solves, such as "dfet:30x3:bernstein:1": search where candidates are evaluated quickly
+        (shooting), and polish where the problem is sparse. The front is then polished after the search, see `Front.polished`, and single
+        agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
+        polished again each time.
+    mesh_tolerance : float, default 1e-7
+        With `mesh="adaptive"`: largest difference between a simulated state and that of the transcription, in spans of its bounds, in
+        [1e-10, 1].
     polish_every : int, default 20
         At most one gradient solve, those during the search included, for so many evaluations, at least 1; where the search chooses its
         inner level, `inner="auto"`, a polish may always make 60. It needs about six for each point of the archive; with more than two
