@@ -37,7 +37,7 @@ from .gradients.multistart import MultistartSolver, MultistartStopping
 from .gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
 from .io.console import working
 from .pareto.dominance import BETTER, distinct
-from .refinement.mending import mended, solved_again
+from .refinement.mending import mended, resolve_unverified
 from .refinement.mesh_loop import MeshLoop, Programs
 from .refinement.mesh_search import SEARCH, MeshSearch, coarse_meshes, search_meshes
 from .solvers.start import beginning, check_run
@@ -167,7 +167,7 @@ def payoff(
         front = job.front(ends, job.ranges(ends), sort=False)
         return front if job.solver.closest is None else front.replace(message=f"nothing feasible was found; {conflict(job.nlp, front[0])}")
 
-    return job.run(work, solved_again)
+    return job.run(work, resolve_unverified)
 
 
 def sweep(
@@ -325,7 +325,7 @@ class _Job:
         task = Scalarised.single(i, len(self.problem.goals))
         self._sole = task.used
         if self.fixed:
-            return self.run(lambda: self.front([self.solver.single(i)], None), solved_again)
+            return self.run(lambda: self.front([self.solver.single(i)], None), resolve_unverified)
         terms, verify = self._terms, self._terms.verify
         limits = SEARCH.optimum * (verify or VERIFY)
         with working(terms.time_limit, terms.progress) as (show, interrupts):

@@ -25,7 +25,7 @@ from ..gradients.multistart import MultistartSolver
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..preferences import Stage
 from ..preferences.stage import no_limits
-from ..refinement.mending import solved_again
+from ..refinement.mending import resolve_unverified
 from ..refinement.mesh_loop import MeshLoop, Programs
 from ..refinement.mesh_search import SEARCH, MeshSearch
 
@@ -162,7 +162,7 @@ class StageSolver:
         confirmed points of a front; what that costs is counted."""
         about = costs(Counts(), wall_time=0.0, seed=None, tolerance=self.solves.tolerance, reproducible=True)
         point = from_vectors(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
-        found = solved_again(point if among is None else unmarked(Points.concatenate([point, among])), verify)
+        found = resolve_unverified(point if among is None else unmarked(Points.concatenate([point, among])), verify)
         spent = {key: found.stats[key] for key in ("gradient_solves", "inner_iterations", "work", "gradient_work")}
         self.solves.counts = self.solves.counts.joined(Counts(**spent, clocked=int(not found.stats["reproducible"])))
         return found[[0]]

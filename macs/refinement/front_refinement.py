@@ -244,7 +244,7 @@ class FrontRefinement:
         return from_vectors(nlp, best.z[None], front.solver, front.stats, **about)
 
 
-def solved_on(
+def solve_on(
     points: Points, rows: Sequence[int], fine: Meshed, programs: Programs, show: Callable[[str], None] = lambda words: None
 ) -> Points:
     """The points in their order, of which those in `rows` have been solved on one mesh, as far as that succeeds; these not simulated.

@@ -24,7 +24,7 @@ from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..io.console import working
 from ..pareto.dominance import extremes
 from ..pareto.spread import Guide, spread
-from .front_refinement import FrontRefinement, solved_on
+from .front_refinement import FrontRefinement, solve_on
 from .mesh_loop import OnMesh, Programs
 
 
@@ -66,26 +66,26 @@ def mended(
         return verified(points, verify)
     with working(time_limit, progress) as (show, interrupts):
         job = _Mending(points, verify, show)
-        again = job.solved_again(fine)
+        again = job.resolve_unverified(fine)
         joined = again if ends is None else job.with_ends(again, ends)
         if joined is job.points and joined.verified.all():
             return joined[best_rows(joined)].sorted()
         # The ranges of the objectives may be others now.
         kept = job.marked(joined[best_rows(joined, verify * objective_scales(joined))])
         if joined is not job.points:
-            kept = job.marked(job.filled(kept, len(points), guide))
-        return job.paid(job.explained(kept.sorted()), interrupts.elapsed, interrupts.reason)
+            kept = job.marked(job.fill_gaps(kept, len(points), guide))
+        return job.with_costs(job.with_reasons(kept.sorted()), interrupts.elapsed, interrupts.reason)
 
 
-def solved_again(points: Points, verify: float) -> Points:
+def resolve_unverified(points: Points, verify: float) -> Points:
     """The points in their order, of which those that are not verified have been solved again. Points that were not simulated are."""
     with working(None, None) as (show, interrupts):
         job = _Mending(points, verify, show)
-        return job.paid(job.explained(job.solved_again()), interrupts.elapsed, interrupts.reason)
+        return job.with_costs(job.with_reasons(job.resolve_unverified()), interrupts.elapsed, interrupts.reason)
 
 
 class _Mending:
-    """One mending, whose steps share programs on meshes and simulations, each made once."""
+    """Points solved again in several steps, which share programs on meshes and simulations, each made once."""
 
     def __init__(self, points: Points, verify: float, show: Callable[[str], None]) -> None:
         problem = points.compiled()
@@ -99,21 +99,21 @@ class _Mending:
         """The points marked by their simulations; notes have no remarks on dynamics."""
         return verified(points, self.verify, remark=False, simulations=self.simulations)
 
-    def explained(self, points: Points) -> Points:
+    def with_reasons(self, points: Points) -> Points:
         """The same with remarks where something is missed: what no solve can mend is to be explained."""
         return points if points.verified.all() else verified(points, self.verify, simulations=self.simulations)
 
-    def paid(self, points: Points, elapsed: float, stopped: str) -> Points:
+    def with_costs(self, points: Points, elapsed: float, stopped: str) -> Points:
         """The points with all that the mending cost."""
         message = self.points.message
         return points.replace(stats=more_costs(points.stats, self._solves.counts, elapsed, stopped), message=message)
 
-    def solved_again(self, fine: Meshed | None = None) -> Points:
+    def resolve_unverified(self, fine: Meshed | None = None) -> Points:
         """The points in their order; `points` itself if none was solved."""
         again = self.points
         if fine is not None:
             every = self._meshed(again, np.ones(len(again), dtype=bool))
-            again = self.marked(solved_on(again, every, fine, self.programs, self.show))
+            again = self.marked(solve_on(again, every, fine, self.programs, self.show))
         elif not again.was_simulated.any():
             again = self.points = self.marked(again)
         again = tried = self._inside(again, _slightly_outside(again, self.verify), MENDING.loss)
@@ -140,10 +140,10 @@ class _Mending:
             return points
         return Points.concatenate([points, ends[better]]).replace(stats=points.stats, solver=points.solver)
 
-    def filled(self, points: Points, size: int, guide: Guide | None) -> Points:
-        """The points, filled up from verified ones; see `filled`."""
+    def fill_gaps(self, points: Points, size: int, guide: Guide | None) -> Points:
+        """The points, filled up from verified ones; see `fill_gaps`."""
         most = self._most_work(points, size - int(points.verified.sum()))
-        return filled(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations, guide)
+        return fill_gaps(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations, guide)
 
     def _as_before(self, points: Points) -> Points:
         """The points, of which those that are verified as they came, and not any more, are as they came."""
@@ -222,7 +222,7 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: flo
     return Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats, solver=points.solver)
 
 
-def filled(
+def fill_gaps(
     points: Points,
     size: int,
     solves: GradientSolves,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from macs import Front, sweep
 from macs.evaluation.evaluator import CONVERGED
 from macs.gradients.ends import ENDS, moved_along
-from macs.refinement.front_refinement import solved_on
+from macs.refinement.front_refinement import solve_on
 from macs.refinement.mesh_loop import Programs
 from problems import Problem
 from transcription import DFET
@@ -41,7 +41,7 @@ def coarse() -> Front:
 
 
 def solved(front: Front, rows: list[int]):
-    return solved_on(front, rows, FINE, Programs(front.compiled()))
+    return solve_on(front, rows, FINE, Programs(front.compiled()))
 
 
 @pytest.mark.slow
