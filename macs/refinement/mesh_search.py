@@ -279,7 +279,9 @@ class MeshSearch:
         if any(one.refinement is None for one in best):
             return self._hopeless >= SEARCH.hopeless or self.loop.ended
         passable = all(one.good or optima.passable for one, optima in zip(best, self.tasks, strict=True))
-        return all(one.good for one in best) or self.loop.ended or (passable and self.loop.work >= WORK.little)
+        # The points of a front get meshes of their own in the end.
+        little = self._ends or self.loop.work >= WORK.little
+        return all(one.good for one in best) or self.loop.ended or (passable and little)
 
     def _begin(self, method: Meshed) -> None:
         """Solve all tasks on a coarse mesh, from further starts if these were not made yet, and refine what is best; where that leads to no
@@ -369,7 +371,7 @@ class MeshSearch:
             loss = optima.task.loss(solved.F)
             if all(abs(loss - other) > SEARCH.clearly * best.unit for other in seen):
                 seen.append(loss)
-                if loss < least or not best.good:
+                if loss < least or not (best.good or self._ends):
                     found.append(((loss - least) / best.unit, method, solved, rule))
         return found
 
