@@ -197,7 +197,7 @@ def press() -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
-SOLVES = [1, 9, 38, *(pytest.param(number, marks=pytest.mark.slow) for number in (5, 20))]
+SOLVES = [1, 9, 20]
 """Gradient solves within which a polish is stopped: of the ends, of the places between them, and late."""
 
 
