@@ -16,7 +16,7 @@ from test_gradient_actions import walk
 
 from macs import MACS, NSGA2, Front
 from macs.evaluation import bilevel
-from macs.gradients import multistart
+from macs.gradients import scalarised
 from macs.gradients.scalarised import WORK
 from macs.pareto import directions
 from macs.search import rounds as module
@@ -249,7 +249,7 @@ def test_others_need_a_number():
 def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_path, monkeypatch, solve):
     """Solve 2 and 9 are of the opening, which begins anew then, since there is no state yet; 25 of a later round."""
     expected = whole(1)  # before anything is counted
-    original, count = multistart.scalarize, iter(range(10**6))
+    original, count = scalarised.scalarize, iter(range(10**6))
 
     def interrupting(*arguments, **more):
         if next(count) == solve:
@@ -257,7 +257,7 @@ def test_what_an_interrupt_cuts_short_among_the_first_solves_is_done_again(tmp_p
         return original(*arguments, **more)
 
     with monkeypatch.context() as patch:
-        patch.setattr(multistart, "scalarize", interrupting)
+        patch.setattr(scalarised, "scalarize", interrupting)
         part = SMALL.solve(walking(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
     assert part.stats["stopped"] == "interrupted" and not part.stats["reproducible"]
     rest = SMALL.solve(walk(), MESH, seed=1, verify=None, checkpoint=tmp_path / "run.ckpt")
