@@ -272,7 +272,14 @@ def distances(problem, seeds, evaluations):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "evaluations", "limit"),
-    [(1, 15_000, 4.0e-3), (2, 15_000, 4.0e-3), (3, 15_000, 4.6e-3), (4, 30_000, 5.0e-3), (6, 30_000, 3.3e-3)],
+    [
+        (1, 15_000, 4.0e-3),
+        (2, 15_000, 4.0e-3),
+        (3, 15_000, 4.6e-3),
+        (4, 15_000, 15e-3),  # 12e-3 on three seeds; below 10e-3 with the parts that docs/method/parts.md has removed as noise elsewhere
+        (4, 30_000, 5.0e-3),
+        (6, 30_000, 3.3e-3),
+    ],
 )
 def test_fronts_of_zitzler_deb_and_thiele(kind, evaluations, limit):
     values = distances(zdt(kind), range(1, 6), evaluations)
