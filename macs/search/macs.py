@@ -5,11 +5,12 @@ from __future__ import annotations
 import inspect
 import logging
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from problems.checks import unknown
 from problems.compiled import CompiledProblem, Objective
 from problems.sampling import refuse_peaks
 from problems.vector import CompiledVectorProblem, without_dynamics
@@ -55,6 +56,8 @@ class MACS(Settings, Solver):
 
         def __init__(self, *args: Any, **settings: Any) -> None:
             refuse_gone(settings)
+            for name in set(settings) - {one.name for one in fields(Settings)}:
+                raise TypeError(unknown("setting of MACS", name, (one.name for one in fields(Settings))))
             super().__init__(*args, **settings)
 
     def begin(self, evaluator: Evaluator, budget: int | None, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:

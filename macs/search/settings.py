@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from problems.checks import check_choice, check_count, check_interval
+from problems.checks import check_choice, check_count, check_interval, short_repr
 from transcription.catalogue import parse
 
 from ..pareto.dominance import CURVE
@@ -42,7 +42,7 @@ def refuse_gone(settings: Iterable[str]) -> None:
             raise ValueError(f"MACS: {name} is no setting any more: {GONE[name]}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Variant:
     """How agents move and what the archive keeps; the defaults are those of `MACS()`. `docs/method/parts.md` has what each part brings."""
 
@@ -60,6 +60,9 @@ class Variant:
     repair: bool = True  # infeasible points move to where linear models of the constraints vanish
     undirected: bool = True  # long searches have agents without a direction
     energy_alone: bool = False  # the archive is spread by the energy of power 2, as in the paper, without volume and niches
+
+    def __repr__(self) -> str:
+        return next((repr(name) for name, one in VARIANTS.items() if one == self), short_repr(self))
 
     @property
     def energy_exponent(self) -> float | None:

@@ -208,6 +208,9 @@ def test_a_setting_of_a_former_version_says_what_to_use(name):
 
 def test_variants_have_names():
     assert MACS(variant="paper").variant == MACS.paper().variant == named_solver("macs", paper=True).variant
+    assert eval(repr(MACS.paper())) == MACS.paper() and repr(MACS()) == "MACS()"
+    with pytest.raises(TypeError, match="unknown setting of MACS 'archiv', did you mean archive"):
+        MACS(archiv=5)
     assert MACS.paper().about()["settings"]["variant"] == "paper" and MACS().about()["settings"]["variant"] == "default"
     own = MACS(variant=Variant(repair=False))
     assert own.about()["settings"]["variant"]["repair"] is False and own != MACS()
