@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 from markdown_it import MarkdownIt
 
+from macs import Front
 from macs.solvers.solver import solver_class
 from problems import names
 from runs import Study
@@ -144,6 +145,16 @@ def check_command(arguments: list[str]) -> None:
         assert call.study in studyfile.names() or call.study.endswith(".toml"), call.study
 
 
+def check_readme(space: dict[str, Any]) -> None:
+    """The whole front, up to where it is known to end, verified, and what the comments say."""
+    front, again = space["front"], Front.load("ascent.nc")
+    assert front.stats["stopped"] == "done" and len(front) == 10 and front.verified.all()
+    assert front.objectives[0, 0] == pytest.approx(109.10894, rel=1e-5) and front.objectives[-1].tolist() == pytest.approx([250, 0.90389])
+    assert front[3].verified is True and front[3].simulated == pytest.approx(front[3].objectives, rel=1e-6)
+    assert max(space["check"].defect["ascent"].values()) < 1e-6 and space["check"].violation < 1e-6
+    assert again.F.tobytes() == front.F.tobytes()
+
+
 def check_choosing(space: dict[str, Any]) -> None:
     """The times of the choices are those of the page."""
     found = [f"{turn.choice.objectives['flight time']:.0f}" for turn in space["dialogue"].history]
@@ -166,6 +177,7 @@ def check_aerocapture(space: dict[str, Any]) -> None:
 
 
 EXTRA = {
+    "README.md": check_readme,
     "docs/choosing.md": check_choosing,
     "docs/vector-problems.md": check_vector_problems,
     "docs/aerocapture.md": check_aerocapture,
