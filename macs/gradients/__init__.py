@@ -1,1 +1,1 @@
-"""Gradient solves: single ones, the best of several starts, the polish of archives and of fronts."""
+"""Gradient solves: single solves, multistart, and the polish of archives and fronts."""

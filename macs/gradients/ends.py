@@ -1,4 +1,4 @@
-"""The ends of a front, the lexicographic optima of its objectives sought from each other, and the points between them."""
+"""The ends of a front, which are the lexicographic optima of its objectives, and the points between them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ METHODS = ("pascoletti-serafini", "epsilon")
 
 @dataclass(frozen=True)
 class EndsLimits:
-    """How lexicographic optima are sought; parts of an objective are of its range between the ends."""
+    """Limits of the search for lexicographic optima; fractions of an objective refer to its range between the ends."""
 
     # Part that is more than the tolerance of the objectives before it explains: if an objective falls by more while these keep their least
     # values, it was not determined by them, and a point where it is lower by more lies in another valley.
@@ -67,7 +67,7 @@ def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved]
 
 
 def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict[tuple[int, int], np.ndarray]) -> None:
-    """Replace optima of single objectives by better ones that short solves from those of the others find, until there are none.
+    """Replace optima of single objectives by better ones, from short solves that start at the other optima, until none improves.
 
     `tried` has the objectives of the optimum k from which objective i was sought before, by (i, k); a solve from another one like it is
     not worth its time.
@@ -117,10 +117,10 @@ def _lexicographic(solver: MultistartSolver, i: int, optima: Sequence[Solved]) -
 def _tied(
     solver: MultistartSolver, j: int, best: Solved, ceiling: np.ndarray, spans: np.ndarray, optimum: Solved
 ) -> tuple[Solved, np.ndarray]:
-    """The least value of objective j, with that of `optimum`, among the points within a ceiling (m,), which `best` attains; and the
-    ceiling, with `EndsLimits.slack` where it was needed.
+    """The least value of objective j under a ceiling (m,), which `best` attains, also from the `optimum` of j alone; and the ceiling, with
+    `EndsLimits.slack` where it was needed.
 
-    Often there is but one such point; nothing is then strictly inside, and a solve would take long to find nothing.
+    Often there is only one such point: the feasible set has no interior then, and a solve takes long without improving anything.
     """
     alone, large = Scalarised.single(j, len(spans), ceiling), ENDS.loose * abs(best.F[j] - optimum.F[j])
     small = len(best.z) <= ENDS.small
@@ -147,7 +147,7 @@ def _tied(
 def _tied_with_slack(
     solver: MultistartSolver, j: int, best: Solved, ceiling: np.ndarray, slack: np.ndarray, large: float
 ) -> tuple[Solved, np.ndarray]:
-    """See `_tied`: what is found with slack (m,) first, in fewer iterations, and then without if more was gained than that is worth."""
+    """See `_tied`: solved with slack (m,) first, in fewer iterations, then without slack if the gain is larger than the slack explains."""
     m = len(slack)
     exactly, freer = Scalarised.single(j, m, ceiling), Scalarised.single(j, m, ceiling + slack)
     with solver.solves.at_most(ENDS.ties):
@@ -175,13 +175,13 @@ def _within(solver: MultistartSolver, solved: Solved, enough: np.ndarray) -> boo
 
 
 def _gone_on(solver: MultistartSolver, solved: Solved, enough: float, task: Scalarised) -> Solved:
-    """A result for one objective; where it did not converge but is below a value that is `enough`, that of a solve near it."""
+    """A result for one objective; if it did not converge but is below the value `enough`, the result of a further solve near it."""
     promising = solved.status != CONVERGED and solved.F[task.moving][0] < enough
     return solver.from_vector(solved.z, task, near=True) if promising else solved
 
 
 def _worth(solved: Solved, j: int, slack: np.ndarray) -> float:
-    """What slacks (m,) of the other objectives are worth in objective j, at its optimum within them: their multipliers are its slopes.
+    """The gain in objective j that slacks (m,) of the other objectives explain: their multipliers at the optimum are its slopes.
 
     Where the front is vertical, the gain is as the square root of the slack, twice what the slope says.
     """
@@ -214,7 +214,7 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
 
 
 def _from_rivals(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved]) -> None:
-    """Replace results by better ones, from what was found for other tasks, as long as there are any."""
+    """Replace results by better ones, from solves that start at the results of other tasks, as long as any improves."""
     for _ in range(ENDS.from_rivals):
         rivals = [solver.rival(solved, task) for solved, task in zip(found, tasks, strict=True)]
         for k, rival in enumerate(rivals):
@@ -225,7 +225,7 @@ def _from_rivals(solver: MultistartSolver, tasks: Sequence[Scalarised], found: l
 
 
 def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved], limit: float) -> bool:
-    """Solve each task from another start; returns whether that replaced a result."""
+    """Solve each task from another start; returns whether any result was replaced."""
     replaced = False
     for k, task in enumerate(tasks):
         if solver.drawn_enough or solver.solves.counts.work >= limit or stopping():
@@ -263,7 +263,7 @@ def _from_simplex(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Sca
 
 
 def _at_limits(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Scalarised]:
-    """Tasks for the first objective that is in conflict, at all combinations of evenly spread limits of the others."""
+    """Tasks for the first objective that is in conflict with another, at all combinations of evenly spread limits on the others."""
     m = len(ends)
     first, *others = np.flatnonzero(ranges > 0)
     levels = int((points - m) ** (1.0 / len(others)) + 1e-9)
@@ -279,10 +279,9 @@ def _at_limits(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Scalar
 
 
 def moved_along(F: np.ndarray, old: np.ndarray, new: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where points of a front are solved from when it is solved again, and along which weights.
+    """References and weights with which the points of a front are re-solved.
 
-    That is where they are, unless the ends of the front have moved; then it is the same place between these. F (k, m), old, new (m, m),
-    units (m,).
+    References are the points themselves or, if the ends have moved, the same places between these. F (k, m), old, new (m, m), units (m,).
     """
     if not len(old) or len(units) == 1 or np.abs((new - old) / units).max() <= ENDS.moved:
         return F, units

@@ -2,9 +2,9 @@
 
 A search needs a transcription whose candidates are evaluated quickly, gradient solves need a sparse one. A point that exceeds a limit
 between its nodes is solved again with that limit tightened by the excess. A finer mesh would help too, at many times the cost; and where
-the excess is small, so is the loss in the objectives. To tighten constraints by their known excess is called back-off: Figueroa, Bahri,
-Bandoni and Romagnoli, "Economic impact of disturbances and uncertain parameters in chemical processes - a dynamic back-off analysis",
-Computers and Chemical Engineering 20(4), 1996.
+the excess is small, so is the loss in the objectives. This tightening of constraints by their known excess is called back-off: Figueroa,
+Bahri, Bandoni and Romagnoli, "Economic impact of disturbances and uncertain parameters in chemical processes - a dynamic back-off
+analysis", Computers and Chemical Engineering 20(4), 1996.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def polished(
     progress: bool | None,
     guide: Guide | None = None,
 ) -> Points:
-    """The polished points; see `Front.polished`. A guide says how densely they are wanted."""
+    """The polished points; see `Front.polished`. A guide sets their density along the front."""
     problem = front.compiled()
     check_problem(problem, transcription)
     # Compared with new points by the objectives on their meshes: no new point has been simulated yet.
@@ -99,7 +99,7 @@ def polished(
 
 
 def _archive(nlp: NLP, known: Points, tolerance: float) -> Archive:
-    """The known points interpolated to this mesh, with their objectives on their own meshes: polished points must be no worse."""
+    """The known points interpolated to this mesh, with the objectives of their own meshes, which polished points must not exceed."""
     starts = [nlp.interpolate(point.trajectory) for point in known if point.trajectory is not None]
     return Archive(np.array(starts), known.F, np.minimum(known.violation, tolerance))
 
@@ -125,8 +125,8 @@ BACK_OFF = BackOffLimits()
 
 
 def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vectors (k, D) of which those that are infeasible when simulated have been solved again with tightened limits; and masks (k,) of
-    those that are feasible, and that were moved. Z (k, D), ranges (m,)."""
+    """Vectors Z (k, D), re-solved with tightened limits where they are infeasible when simulated; and masks (k,) of the feasible and of the
+    moved ones. ranges (m,)."""
     nlp, Z = evaluator.nlp, Z.copy()
     F = nlp.evaluate(Z)[0] if len(Z) else np.empty((0, len(ranges)))
     margins = np.zeros((len(Z), len(nlp.g_scale)))
@@ -148,7 +148,7 @@ def back_off(evaluator: Bilevel, Z: np.ndarray, ranges: np.ndarray, verify: floa
 
 
 def _infeasible(nlp: NLP, Z: np.ndarray, waiting: np.ndarray, margins: np.ndarray, feasible: np.ndarray, verify: float) -> np.ndarray:
-    """Those of the rows `waiting` that are infeasible when simulated; increases their `margins` by the excess and updates `feasible`."""
+    """The rows of `waiting` that are infeasible when simulated; increases their `margins` by the excess and updates `feasible`."""
     rtol, atol = _accuracy(verify)
     simulations = simulate_all(nlp.problem, [nlp.unpack(z) for z in Z[waiting]], rtol=rtol, atol=atol)
     feasible[waiting] = [simulation.violation <= verify for simulation in simulations]
@@ -164,8 +164,8 @@ def _by_row(violations: Mapping[str, float], labels: Sequence[str]) -> np.ndarra
 
 
 def feasible_when_simulated(found: np.ndarray, known: Points, verify: float) -> tuple[Points, int]:
-    """The known points without those that are infeasible when simulated, and how many of them were not simulated because the work is to
-    end; points that `found` (k, m) dominates need not be."""
+    """The known points that are feasible when simulated, and the number of points not simulated because the work has to end; points that
+    `found` (k, m) dominates are not simulated."""
     feasible, seen = np.ones(len(known), dtype=bool), np.zeros(len(known), dtype=bool)
     while True:
         rows = np.flatnonzero(feasible)

@@ -1,12 +1,11 @@
-"""The best of gradient solves of a scalarised problem from several starts.
+"""Multistart: the best of gradient solves of a scalarised problem from several starts.
 
-A solve ends in the valley in which it begins. Trajectories of most controls drawn at random are much alike, so that starts are of several
-kinds; near the best that is known other valleys are often better ones. That is monotonic basin hopping: Leary, "Global optimization on
+A solve ends in the valley in which it begins. Most random controls give similar trajectories, so starts are of several kinds. Valleys near
+the best known optimum are often better, so every second start lies near it: monotonic basin hopping; Leary, "Global optimization on
 funneling landscapes", J. Global Optimization 18, 2000; for trajectories Englander and Conway, "Automated solution of the low-thrust
-interplanetary trajectory problem", J. Guidance 40(1), 2017. When to end: after k solves that found w different
-optima, the probability that the next one finds another is w (w + 1) / (k (k - 1)), if before the first all numbers of optima, and all sizes
-of their valleys, were alike: Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical
-Programming 37, 1987.
+interplanetary trajectory problem", J. Guidance 40(1), 2017. The stopping rule: after k solves with w different optima, the probability that
+the next solve finds a new one is w (w + 1) / (k (k - 1)), with a uniform prior on the number of optima and the sizes of their valleys:
+Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from .scalarised import WORK, GradientSolves, Scalarised
 
 @dataclass(frozen=True)
 class MultistartLimits:
-    """When results differ, and when starts are enough."""
+    """Tolerances between results, and the rules by which starts are enough."""
 
     excess: float = 1e-8  # part of an objective's range by which its limit may be exceeded
     clearly: float = 1e-7  # difference in alpha by which a result is clearly better: the accuracy of solves
@@ -65,7 +64,7 @@ a phase in which controls deviate: what else there is to a good solution stays a
 
 
 class Starts:
-    """Starts of gradient solves of one NLP, later every second near the best vector that is known."""
+    """Starts of gradient solves of one NLP; later, every second start is near the best known vector."""
 
     def __init__(self, nlp: NLP, rng: np.random.Generator, drawn: int = 0) -> None:
         self._nlp, self._rng, self.drawn = nlp, rng, drawn
@@ -95,14 +94,14 @@ class Starts:
         return moved
 
     def _propagated(self, z: np.ndarray) -> np.ndarray:
-        """The vector with propagated states, unless these are absurd, and as it is."""
+        """The vector with propagated states, unless these violate constraints hopelessly, and the vector itself."""
         states = self._nlp.propagate(z[None])
         usable = np.isfinite(states).all() and self._nlp.evaluate(states)[1][0] <= MULTISTART.hopeless
         return np.vstack([states, z]) if usable else z[None]
 
 
 class MultistartStopping:
-    """What solves of one problem from different starts led to, how many optima and how often the best, and whether there were enough."""
+    """Stopping rule of a multistart: the number of optima, how often the best was found, and whether the starts are enough."""
 
     def __init__(self, unseen: float = MULTISTART.unseen) -> None:
         self._losses: list[float] = []
@@ -110,7 +109,7 @@ class MultistartStopping:
         self._last, self._unseen = 0, unseen
 
     def add(self, loss: float | None) -> bool:
-        """Count a solve that ended at an optimum with this loss, less is better, or at none; returns whether it is the best so far."""
+        """Count a solve that ended at an optimum with this loss, or at none; returns whether it is the best so far."""
         self.starts += 1
         if loss is None:
             return False
@@ -138,7 +137,7 @@ class MultistartStopping:
 
     @property
     def enough(self) -> bool:
-        """Whether more starts are not expected to find anything else, or have found nothing better for long."""
+        """Whether further starts are not expected to find another optimum, or have found nothing better for long."""
         found, optima = self.converged, self.optima()
         if not found:
             return self.starts >= MULTISTART.fewest
@@ -156,7 +155,7 @@ class MultistartStopping:
 
 
 class MultistartSolver:
-    """Solver of scalarised problems of one NLP, each from the best vector that is known for it and from other starts; given (k, n).
+    """Solver of scalarised problems of one NLP, each from its best known vector and from other starts; given (k, n).
 
     With `starts` None, an optimum of one objective is sought from as many starts as pay; see `MultistartStopping`.
     """
@@ -183,7 +182,7 @@ class MultistartSolver:
 
     @property
     def drawn_enough(self) -> bool:
-        """Whether as many starts were drawn as may be."""
+        """Whether the largest number of starts has been drawn."""
         return self._starts.drawn >= self.most
 
     def solve(self, task: Scalarised, start: np.ndarray | None = None) -> Solved:
@@ -195,8 +194,8 @@ class MultistartSolver:
         return self.better(found, task)
 
     def single(self, i: int) -> Solved:
-        """The optimum of objective i alone. Where a solve from the best that is known does not end, as that is an optimum of another
-        objective within tight limits, also from what was given."""
+        """The optimum of objective i alone. A solve from the best known vector may fail if that is an optimum of another objective within
+        tight limits; then the given vectors are starts, too."""
         task = Scalarised.single(i, len(self.nlp.problem.goals))
         if self.closest is not None:
             return self.closest
@@ -212,7 +211,7 @@ class MultistartSolver:
         return solved
 
     def seek(self, task: Scalarised, stopping_rule: MultistartStopping) -> Solved:
-        """The best result of as many solves as pay: further starts end when they have taken a little, or as much as the first one took."""
+        """The best result of a multistart: further starts end when they have taken a little work, or as much as the first one."""
         before = self.solves.counts.work
         best = self.with_feasible_start(self.solve(task), task)
         limit = self.solves.counts.work + max(WORK.little, self.solves.counts.work - before)
@@ -235,7 +234,7 @@ class MultistartSolver:
         return best
 
     def with_feasible_start(self, solved: Solved, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
-        """The result of a solve, or, where that is not feasible, of one from a vector that is.
+        """The result of a solve; if it is infeasible, the result of a solve from a feasible vector.
 
         That vector is sought near the best that is known and near starts that are drawn, of which fewest and most are `tries`. If there is
         none near any of them, the result is
@@ -266,8 +265,8 @@ class MultistartSolver:
         return solved
 
     def from_drawn(self, task: Scalarised, best: Solved | None = None) -> Solved:
-        """The result of a solve from a start that is drawn; `best` is the best result so far. Where there is none, and propagated states
-        lead to no optimum, also from the states of the guess."""
+        """The result of a solve from a random start; `best` is the best result so far. If there is none and propagated states lead to no
+        optimum, the states of the guess are tried, too."""
         found: list[Solved] = []
         for start in self._starts.draw(None if best is None else best.z):
             found.append(self.from_vector(start, task))
@@ -276,7 +275,7 @@ class MultistartSolver:
         return self.better(found, task)
 
     def merits(self, task: Scalarised, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
-        """Merits (k,) of points F (k, m) for a problem, less is better: their alpha plus their excess over limits and constraints.
+        """Merits (k,) of points F (k, m) for a problem, to be minimised: alpha plus the excess over limits and constraints.
 
         The excess over limits is in ranges of the objectives among the known points. With `strict`, as for results, a point with any excess
         has an infinite merit; without, as for starts, it may still be good.
@@ -308,7 +307,8 @@ class MultistartSolver:
         return self._known[np.argmin(merits)] if merits.min() < own - MULTISTART.clearly else None
 
     def from_rival(self, rival: np.ndarray, solved: Solved, task: Scalarised) -> Solved:
-        """The better of a result and a solve from a known vector (n,) that is better; where that goes elsewhere, one that stays near it."""
+        """The better of a result and a solve from a better known vector (n,); if that solve moves far away, of one that stays near the
+        vector."""
         found = self.better([solved, self.from_vector(rival, task)], task)
         if self.rival(found, task) is not None:
             found = self.better([found, self.from_vector(rival, task, near=True)], task)
@@ -320,13 +320,13 @@ class MultistartSolver:
 
 
 def alpha_of(task: Scalarised, solved: Solved) -> float | None:
-    """What a problem minimises, at a result that converged."""
+    """The alpha of a problem at a converged result."""
     return float(task.alpha(solved.F)) if solved.status == CONVERGED else None
 
 
 def is_least(nlp: NLP, z: np.ndarray, task: Scalarised) -> bool:
-    """Whether a vector (n,) has the least value that the bounds of variables allow an objective to have: where it is linear, and the only
-    one of the problem. No other start can then lead to less, by more than the accuracy of solves."""
+    """Whether a vector (n,) attains the least value of a linear objective, the only one of the problem, over the bounds of the variables.
+    No other start can then improve it by more than the accuracy of solves."""
     (used,) = np.nonzero(task.used)
     if len(used) != 1:
         return False
@@ -337,7 +337,7 @@ def is_least(nlp: NLP, z: np.ndarray, task: Scalarised) -> bool:
 
 
 def guessed_start(nlp: NLP) -> np.ndarray | None:
-    """The problem's guess as a full vector (1, n), in the middle of the bounds where there is none; None without any guess."""
+    """The problem's guess as a full vector (1, n), with the middle of the bounds where nothing is guessed; None without any guess."""
     if not np.isfinite(nlp.guess).any():
         return None
     middle = 0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])

@@ -1,6 +1,6 @@
 """Gradient polish of an archive: its points are moved to the Pareto front by gradient solves, and spread along it.
 
-Solves are made up to a number and kept in a log, so that a polish that was ended early can be continued.
+The number of solves is limited, and a log keeps their results, so that an interrupted polish can be continued.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..pareto.spread import Guide, reach, spread
 
 @dataclass(frozen=True)
 class PolishLimits:
-    """How points are moved and spread; objectives are in ranges of the front."""
+    """Limits of the polish; objectives are in ranges of the front."""
 
     # An end may be replaced by a point that is worse in another objective by more than `loss` if it gains more than `fair` in its own.
     fair: float = 1e-4
@@ -101,15 +101,15 @@ def polish(
 
 
 def _thinned(pool: Archive, limit: int, exponent: float | None, guide: Guide | None) -> Archive:
-    """At most `limit` points of the pool, evenly spread, or as the guide wants them."""
+    """At most `limit` points of the pool, evenly spread, or by the guide's density."""
     return pool if len(pool) <= limit else pool.take(spread(pool.F, limit, exponent=exponent, guide=guide))
 
 
 def _descend(
     archive: Archive, solves: BudgetedSolves, solved: np.ndarray, exponent: float | None, guide: Guide | None
 ) -> tuple[Archive, Archive]:
-    """The points after one guarded solve each, but for those with objectives (k, m) that were `solved` already, with the ends of the front;
-    and the points that are left out for want of solves."""
+    """The points after one guarded solve each, except for objectives (k, m) that are `solved` already, with the ends of the front; and the
+    points for which no solves are left."""
     span = ranges(archive.F)
     most = max((solves.left - 2 * archive.F.shape[1]) // 2, 1)
     fresh = ~among(archive.F, solved)
@@ -125,7 +125,7 @@ def _descend(
 
 
 def _settled(archive: Archive, optima: Archive) -> Archive:
-    """The archive, with optima in place of points that are no better than these by more than their violation explains."""
+    """The archive, with points replaced by optima unless they are better by more than their violation explains."""
     if not len(optima):
         return archive
     span = ranges(archive.F)
@@ -136,7 +136,7 @@ def _settled(archive: Archive, optima: Archive) -> Archive:
 
 
 def _ends(archive: Archive, span: np.ndarray, solves: BudgetedSolves, solved: np.ndarray) -> Archive:
-    """One point for each objective: its least value, and for that the least values of the others; as they are where all were `solved`."""
+    """One point for each objective, its lexicographic optimum; unchanged if all are `solved`."""
     m = archive.F.shape[1]
     best = archive.take(extremes(archive.F))
     if among(best.F, solved).all():
@@ -156,8 +156,8 @@ def _ends(archive: Archive, span: np.ndarray, solves: BudgetedSolves, solved: np
 
 
 def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.ndarray | None = None) -> Archive:
-    """The archive after guarded solves of all, or the chosen, points from their neighbours, but for those that were in vain before; the
-    archive itself if none is better or solves are too few."""
+    """The archive after guarded solves of all, or the chosen, points from their neighbours, except those that failed before; the archive
+    itself if none improves or too few solves are left."""
     span, m = ranges(archive.F), archive.F.shape[1]
     rows = range(len(archive)) if chosen is None else np.unique(chosen).tolist()
     pairs = [(i, j) for i in rows for j in nearest(archive.F[i], archive.F, span)[1 : m + 1]]
@@ -220,7 +220,7 @@ def _front(points: Archive, span: np.ndarray) -> Archive:
 
 @dataclass(frozen=True)
 class SurfaceTask:
-    """Gradient solve to be made: the row of the point at which it starts, the reference (m,), and the place (m,) that it goes to."""
+    """A planned gradient solve: the row of the point at which it starts, the reference (m,), and the target place (m,)."""
 
     start: int
     reference: np.ndarray
@@ -229,8 +229,8 @@ class SurfaceTask:
 
 @dataclass
 class Surface:
-    """Points on a surface, and the places that solves went to. Distances are in the plane across the diagonal, in units of the front
-    between its ends."""
+    """Points on a surface, and the target places of solves. Distances are in the plane across the diagonal, in units of the front between
+    its ends."""
 
     pool: Archive  # the points, the latest first
     ideal: np.ndarray  # (m,): least values of the ends
@@ -251,15 +251,15 @@ class Surface:
         return self.pool.take(distinct(self.pool.F, self.between))
 
     def even(self) -> SurfaceTask:
-        """To the place that is farthest from all known ones, from the point that is best for it."""
+        """The task for the place that is farthest from all known places, from the best point for it."""
         place = self.lattice[np.argmax(self._apart(self.lattice))]
         reference = self.ideal + self.between * place
         start = ((self.pool.F - reference) / self.between).max(axis=1).argmin()
         return SurfaceTask(int(start), reference, place)
 
     def guided(self, guide: Guide) -> SurfaceTask:
-        """To the place, around the point that the guide puts first, that is farthest from known ones, by the factors that are expected
-        there; from the nearest of the points where the guide wants most: what is good for the place alone may lie in a poor valley."""
+        """The task for the place, around the guide's first point, that is farthest from known places, by the factors expected there. It
+        starts at the nearest of the points where the guide wants most: the best point for the place alone may lie in a poor valley."""
         first = int(guide.anchors(self.pool.F)[0])
         shape = self.lattice - self.lattice.mean(axis=0)
         places = np.vstack([self.plane(self.pool.F[first : first + 1]) + part * shape for part in POLISH.closer])
@@ -354,7 +354,7 @@ class BudgetedSolves:
         self.left, self.stopped, self.failed_pairs = left, False, failed_pairs
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """The results of `Evaluator.descend`; rows beyond the number of solves have failed."""
+        """The results of `Evaluator.descend`; rows beyond the number of solves count as failed."""
         Z, F = np.array(starts), np.full(references.shape, np.nan)
         violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
         for row in range(max(min(len(starts), self.left), 0)):
@@ -368,7 +368,7 @@ class BudgetedSolves:
         return Evaluation(Z, F, violation, status)
 
     def feasible(self, found: Evaluation) -> np.ndarray:
-        """Mask (k,) of the feasible results: those that ran out of iterations may be, too."""
+        """Mask (k,) of the feasible results, which may include solves that ran out of iterations."""
         return (found.status == CONVERGED) | (found.violation <= self._evaluator.tolerance)
 
     def _solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> Evaluation:

@@ -1,4 +1,4 @@
-"""Scalarised problems of several objectives, and their gradient solves, which are counted."""
+"""Scalarised problems of several objectives, and their counted gradient solves."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Scalarised:
 
     @property
     def sharp(self) -> np.ndarray:
-        """Mask (m,) of those that a solve determines as exactly as its tolerance."""
+        """Mask (m,) of the objectives that a solve determines to its tolerance."""
         return self.used
 
     @property
@@ -55,7 +55,7 @@ class Scalarised:
         return (self.reference < np.inf) & (self.weights <= 0)
 
     def alpha(self, F: np.ndarray) -> Any:
-        """What is minimised, at objectives (..., m)."""
+        """The minimised alpha, at objectives (..., m)."""
         moving = self.moving
         return np.max((F[..., moving] - self.reference[moving]) / self.weights[moving], axis=-1, initial=-np.inf)
 
@@ -67,7 +67,7 @@ class Scalarised:
         return float(alpha + np.maximum((F - self.reference)[hard] / units[hard], 0.0).sum())
 
     def rank(self, solved: Solved) -> tuple[bool, float]:
-        """Results that converged before others, by their loss; the others by their violation."""
+        """Order of results: converged ones first, by their loss; then the others by their violation."""
         failed = solved.status != CONVERGED
         return failed, solved.violation if failed else self.loss(solved.F)
 
@@ -78,7 +78,7 @@ class Scalarised:
 
 @dataclass(frozen=True)
 class EndLimits:
-    """How an end of a front is solved on another mesh."""
+    """Limits of the solves for an end of a front on another mesh."""
 
     room: float = 0.05  # how much worse other objectives may become, in units, before the end is also sought near where it was
     tied: float = 1e-6  # what counts as no loss of its own objective then, in units
@@ -90,7 +90,7 @@ END = EndLimits()
 
 @dataclass(frozen=True, eq=False)
 class LexicographicEnd(Scalarised):
-    """The least value of one objective, and for that the least values of the others, on another mesh."""
+    """A lexicographic optimum on another mesh: the least value of one objective, and subject to it the least values of the others."""
 
     # (m,): Objectives of the end on the mesh before. Many points may have the least value of the one objective, such as its bound: one with
     # the others near these is preferred.
@@ -147,7 +147,7 @@ MOST_ITERATIONS = 500
 
 @dataclass(frozen=True)
 class WorkLimits:
-    """What may be spent, as `Counts.work`: iterations times variables, so that no clock decides."""
+    """Limits on work, as `Counts.work`: iterations times variables, so that no clock decides."""
 
     building: float = 30.0  # iterations that take as long as it takes to make a program with its derivatives: measured 18 to 53
     little: float = 6e5  # what other starts may always take together: a second or two
@@ -173,7 +173,7 @@ class GradientSolves:
         return self._counted(nlp, scalarize(nlp, start, **aim, near=near, **limits))
 
     def least_violation(self, nlp: NLP, start: np.ndarray) -> Solved:
-        """What is feasible, or violates least, near a vector (n,); see `least_violation`."""
+        """A feasible or least violating vector near a vector (n,); see `least_violation`."""
         self.before()
         return self._counted(nlp, least_violation(nlp, start, tolerance=self.tolerance))
 
@@ -183,7 +183,7 @@ class GradientSolves:
 
     @contextmanager
     def at_most(self, iterations: int) -> Iterator[None]:
-        """Solves within take no more iterations than these, of which the first strategy may take all."""
+        """Context in which solves take at most these iterations, of which the first strategy may take all."""
         usual = self.max_iterations
         self.max_iterations, self._persistent = min(usual, iterations), False
         try:
@@ -194,7 +194,8 @@ class GradientSolves:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A vector z (n,) at which a solve begins, whether it looks near that only, and by how much its result may be worse than is known."""
+    """A vector z (n,) at which a solve begins, whether the solve stays near it, and by how much its result may be worse than the known
+    one."""
 
     z: np.ndarray
     near: bool = False

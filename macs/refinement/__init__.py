@@ -1,1 +1,1 @@
-"""Points on meshes that simulations agree with: single optima, whole fronts, the mesh of a search, and points that miss."""
+"""Points on meshes that simulations confirm: single optima, whole fronts, the mesh of a search, and points that are not verified."""

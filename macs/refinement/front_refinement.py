@@ -36,7 +36,7 @@ from .mesh_loop import LOOP, MeshLoop, OnMesh, Programs, Refinement, differentia
 
 @dataclass(frozen=True)
 class FrontLimits:
-    """How the points of a front are refined."""
+    """Limits of the refinement of a front."""
 
     tolerance: float = 1e-10  # smallest that double precision and the integrator can resolve
     optimal: float = 1e-6  # a point with at most this optimality is not solved again on its first mesh
@@ -59,8 +59,8 @@ NOT_BEGUN = "it was not solved on a finer mesh"
 def front_tasks(
     F: np.ndarray, ends: Mapping[int, LexicographicEnd], between: Sequence[int], units: np.ndarray, done: Mapping[int, np.ndarray]
 ) -> Iterator[tuple[int, Scalarised]]:
-    """Rows of a front F (k, m), and what each is solved for on another mesh: its ends, then those between them from the nearest to what is
-    `done` on, row -> objectives (m,), which the caller fills. Where the ends have moved, the others move along."""
+    """Rows of a front F (k, m) with their tasks on another mesh: the ends first, then the points between them, nearest to a `done` point
+    first. The caller fills `done`, row -> objectives (m,). If the ends have moved, the references of the others move along."""
     yield from ends.items()
     known = [i for i in ends if i in done]
     known = known if len(known) == len(units) else []
@@ -164,7 +164,7 @@ class FrontRefinement:
         return method
 
     def _ends(self) -> dict[int, LexicographicEnd]:
-        """The points that are ends of the whole front, not only of the part that is here: found out on their own meshes."""
+        """The points that are ends of the whole front, not only of this part of it, by solves on their own meshes."""
         ends: dict[int, LexicographicEnd] = {}
         if not differentiable(self.loop.problem):
             return ends
@@ -218,7 +218,7 @@ class FrontRefinement:
         self._rows[i] = self._row(i, found.best, found.note)
 
     def _meshes_near(self, done: Sequence[int], error: float, task: Scalarised) -> list[Meshed]:
-        """Meshes that are tried first for a point with an error, in units of what it may be: those of the nearest that is `done`."""
+        """Meshes to try first for a point with an error, in units of the tolerance: those of the nearest `done` point."""
         if not done:
             return []
         nearest = self.found[done[0]]
@@ -247,7 +247,7 @@ class FrontRefinement:
 def solve_on(
     points: Points, rows: Sequence[int], fine: Meshed, programs: Programs, show: Callable[[str], None] = lambda words: None
 ) -> Points:
-    """The points in their order, of which those in `rows` have been solved on one mesh, as far as that succeeds; these not simulated.
+    """The points in their order; those in `rows` are re-solved on one mesh where that succeeds, and not simulated.
 
     Nothing is simulated in between: a simulation of all takes less time than those of one after the other.
     """
@@ -262,7 +262,7 @@ def solve_on(
 
 
 class _FineFront:
-    """The points of one front on one mesh, those that are done: row -> result."""
+    """The points of a front on one mesh; `done` is row -> result."""
 
     def __init__(self, points: Points, rows: Sequence[int], nlp: NLP, solves: GradientSolves) -> None:
         self.front, self.rows, self.nlp, self.solves = points, list(rows), nlp, solves
@@ -270,7 +270,7 @@ class _FineFront:
         self.units = MeshLoop.units(points.F[self.rows], nlp, self._start(self.rows[0]))
 
     def go(self, show: Callable[[str], None]) -> None:
-        """Solve all points, or those until the work is to end."""
+        """Solve all points, until the work has to end."""
         F, ends = self.front.F, dict[int, LexicographicEnd]()
         for objective, k in enumerate(extremes(F[self.rows])):
             ends.setdefault(self.rows[k], LexicographicEnd.of(objective, self.units, F[self.rows[k]]))
@@ -292,7 +292,7 @@ class _FineFront:
         return Points.concatenate(rows).replace(solver=front.solver, stats=stats, message=front.message)
 
     def _solve(self, i: int, task: Scalarised, show: Callable[[str], None]) -> None:
-        """Solve one point from its own trajectory and, if it is lost or gets worse, from its neighbours on this mesh."""
+        """Solve one point from its own trajectory and, if that fails or gets worse, from its neighbours on this mesh."""
         show(f"points on a finer mesh: {len(self.done) + 1} of {len(self.rows)}")
         near = sorted(self.done, key=lambda j: self._distance(i, j))[: FRONT.neighbours]
         starts = (Start(z, drift=LOOP.drift) for z in (self._start(i), *(self.done[j].z for j in near)))

@@ -1,4 +1,4 @@
-"""Points that a simulation does not confirm, solved again: on finer meshes, or inside of the limits that they exceed."""
+"""Re-solves points that a simulation does not confirm: on finer meshes, or with tightened limits."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from .mesh_loop import OnMesh, Programs
 
 @dataclass(frozen=True)
 class MendingLimits:
-    """What points that a simulation does not confirm may take."""
+    """Limits on the re-solves of points that a simulation does not confirm."""
 
     part: float = 0.8  # what points are to miss at most, as a fraction of what they may
     meshes: int = 6  # most of one point
@@ -56,7 +56,7 @@ def mended(
     ends: Points | None = None,
     guide: Guide | None = None,
 ) -> Points:
-    """The front of the points of which those that are not verified have been solved again; see `Front.mended`.
+    """The front with its unverified points re-solved; see `Front.mended`.
 
     With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Of `ends`, optima of
     single objectives, those come in that are better in one than all of the points. Points that were not simulated are, for `verify`. A
@@ -78,14 +78,14 @@ def mended(
 
 
 def resolve_unverified(points: Points, verify: float) -> Points:
-    """The points in their order, of which those that are not verified have been solved again. Points that were not simulated are."""
+    """The points in their order, the unverified ones re-solved. Points without a simulation are simulated first."""
     with working(None, None) as (show, interrupts):
         job = _Mending(points, verify, show)
         return job.with_costs(job.with_reasons(job.resolve_unverified()), interrupts.elapsed, interrupts.reason)
 
 
 class _Mending:
-    """Points solved again in several steps, which share programs on meshes and simulations, each made once."""
+    """The re-solves in several steps, which share programs on meshes and simulations, each made once."""
 
     def __init__(self, points: Points, verify: float, show: Callable[[str], None]) -> None:
         problem = points.compiled()
@@ -96,15 +96,15 @@ class _Mending:
         self._work = points.stats.get("work", 0)
 
     def marked(self, points: Points) -> Points:
-        """The points marked by their simulations; notes have no remarks on dynamics."""
+        """The points marked by their simulations, without remarks on dynamics in their notes."""
         return verified(points, self.verify, remark=False, simulations=self.simulations)
 
     def with_reasons(self, points: Points) -> Points:
-        """The same with remarks where something is missed: what no solve can mend is to be explained."""
+        """The same with remarks on unverified points, since no solve can cure unstable dynamics."""
         return points if points.verified.all() else verified(points, self.verify, simulations=self.simulations)
 
     def with_costs(self, points: Points, elapsed: float, stopped: str) -> Points:
-        """The points with all that the mending cost."""
+        """The points with all costs of the re-solves."""
         message = self.points.message
         return points.replace(stats=more_costs(points.stats, self._solves.counts, elapsed, stopped), message=message)
 
@@ -125,14 +125,14 @@ class _Mending:
         return self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
 
     def _inside(self, points: Points, rows: list[int], loss: float = np.inf) -> Points:
-        """The points, of which those in `rows` were moved inside the limits that they exceed; see `_inside_limits`."""
+        """The points, with those in `rows` moved inside the limits that they exceed; see `_inside_limits`."""
         if not rows:
             return points
         self.show("points that are infeasible when simulated are solved again")
         return self.marked(_inside_limits(points, rows, self.verify, loss))
 
     def with_ends(self, points: Points, ends: Points) -> Points:
-        """The points with those verified ends that are better in an objective than all of them, by more than a point may miss."""
+        """The points with those verified ends that are better in an objective than all of them, by more than the tolerance."""
         scales, ends = objective_scales(points), self.marked(ends)
         good = points.simulated_F[points.verified]
         better = ends.verified & (ends.simulated_F < good.min(axis=0, initial=np.inf) - self.verify * scales).any(axis=1)
@@ -146,7 +146,7 @@ class _Mending:
         return fill_gaps(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations, guide)
 
     def _as_before(self, points: Points) -> Points:
-        """The points, of which those that are verified as they came, and not any more, are as they came."""
+        """The points, with the original in place of each that was verified originally and no longer is."""
         unseen = np.flatnonzero(~points.verified & ~self.points.was_simulated).tolist()
         lost = [i for i in unseen if points.trajectories[i] is not self.points.trajectories[i]]
         if not lost:
@@ -184,8 +184,8 @@ class _Mending:
         return again.replace(notes=["" if i in job.found and again.verified[i] else note for i, note in enumerate(again.notes)])
 
     def _most_work(self, points: Points, count: int) -> float | None:
-        """What may still be spent on so many points, in iterations times variables; None for as much as it takes, where nothing was
-        searched: then the mesh is all that there is to be found."""
+        """The work left for so many points, in iterations times variables; None (no limit) where there was no search, so that the mesh is
+        the only task."""
         if not points.stats["evaluations"]:
             return None
         spent = points.stats.get("work", 0) - self._work + WORK.building * self.programs.built
@@ -194,16 +194,16 @@ class _Mending:
 
 
 def _slightly_outside(points: Points, verify: float) -> list[int]:
-    """The points of which a simulation shows nothing wrong but that they exceed limits, by little: mostly between nodes. On the mesh that
-    they have, whose program is there already, a solve costs far less than on any other."""
+    """The points whose only fault in a simulation is that they exceed limits a little, mostly between nodes. A solve on their own mesh,
+    whose program exists already, costs far less than on any other."""
     beyond = (points.simulated_violation > verify) & (points.simulated_violation <= MENDING.slightly) & (points.status == CONVERGED)
     off = np.abs(points.simulated_F - points.F) / objective_scales(points)
     return np.flatnonzero(beyond & (points.defect <= verify) & (off <= verify).all(axis=1)).tolist()
 
 
 def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: float = np.inf) -> Points:
-    """The points, with those of `rows` that can be moved inside of the limits that they exceed when simulated, as long as no objective
-    gets worse by more than the loss, in ranges of the front."""
+    """The points, with those of `rows` moved inside the limits that they exceed when simulated, where no objective gets worse by more than
+    the loss, in ranges of the front."""
     moved: dict[int, Points] = {}
     for transcription in {id(points.transcriptions[i]): points.transcriptions[i] for i in rows}.values():
         own = [i for i in rows if points.transcriptions[i] is transcription]
@@ -231,7 +231,7 @@ def fill_gaps(
     simulations: Simulations,
     guide: Guide | None = None,
 ) -> Points:
-    """The points with further verified ones, until `size` of them are verified or the work is done.
+    """The points with further verified ones, until `size` of them are verified or the work is used up.
 
     Solves lead first to where points are that are not verified, then to the middle of the widest gaps between verified ones. Each goes from
     there to the front along the ranges of the objectives (Pascoletti and Serafini 1984) and starts at the nearest verified points, on their
@@ -273,8 +273,8 @@ def _needed(points: Points) -> np.ndarray:
 
 
 def _target(points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide | None) -> np.ndarray | None:
-    """Where to go next (m,): to the point that is not verified and nearest to one that is; without any, to the middle of the widest gap
-    between verified points that are neighbours in the first of two objectives. None if all of that was tried."""
+    """The next target (m,): the unverified point nearest to a verified one; without any, the middle of the widest gap between verified
+    points that are neighbours in the first of two objectives. None if all were tried."""
     good, others = points.simulated_F[points.verified], points.F[~points.verified]
     others = others[[not (row == tried).all(axis=1).any() for row in others]]
     if len(others):

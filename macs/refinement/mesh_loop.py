@@ -28,7 +28,7 @@ from ..pareto.dominance import objective_units, stated_scales
 
 @dataclass(frozen=True)
 class LoopLimits:
-    """When a point goes on to another mesh, and how it is solved there. Units are of objectives, see `MeshLoop.units`."""
+    """When a point continues on another mesh, and how it is solved there. Units are of objectives, see `MeshLoop.units`."""
 
     kept: int = 3  # programs: of the meshes on which the next points are likely to be solved, too
     little: float = 1e-4  # part of what an objective varies by near a trajectory that counts as one unit of it at least
@@ -50,8 +50,8 @@ TROUBLES = {"": "its mesh cannot be refined further", CONVERGED: "finer meshes d
 
 
 class Programs:
-    """The NLPs of a problem on meshes, of which the latest few are kept: one takes some ten megabytes. Those that the problem keeps anyway,
-    since a search was made on them, are not made again."""
+    """Cache of the latest NLPs of a problem on meshes, which take some ten megabytes each. NLPs that the problem keeps anyway, from a
+    search, are reused."""
 
     def __init__(self, problem: CompiledProblem, kept: int = LOOP.kept) -> None:
         self.problem, self.built, self._most = problem, 0, kept
@@ -86,12 +86,12 @@ class OnMesh:
 
     @property
     def gaining(self) -> bool:
-        """Whether other controls would gain more than an objective may be off, as far as is known."""
+        """Whether other controls are known to gain more than the tolerance of an objective."""
         return not self.tried and self.verdict.gain > self.verdict.wanted.settled
 
     @property
     def error(self) -> float:
-        """The largest error, or change from the mesh before, in units of what it may be."""
+        """The largest error, or change from the previous mesh, in units of the tolerance."""
         wanted = self.verdict.wanted
         unsettled = max(self.change, self.verdict.gain if self.gaining else 0.0) / wanted.settled
         return max(self.verdict.error, unsettled if wanted.confirmed else 0.0)
@@ -112,7 +112,7 @@ class OnMesh:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A mesh to be tried; whether its result must be an improvement to be taken; and whether it is sought near by first."""
+    """A mesh to try, whether its result counts only as an improvement, and whether the first solve stays near the present point."""
 
     method: Meshed
     better: bool = False
@@ -121,7 +121,7 @@ class Proposal:
 
 @dataclass(eq=False)
 class Refinement:
-    """What became of a point."""
+    """The result of refining a point."""
 
     best: OnMesh  # the point on the best of its meshes: good enough if any is, else that of the least error
     trouble: str = ""  # reason why there were no finer meshes although it is not good enough
@@ -137,7 +137,7 @@ class Refinement:
 
     @property
     def note(self) -> str:
-        """All that is to be said of it."""
+        """The complaints and remarks about the point in one text."""
         complaints = self.complaints()
         if complaints:
             complaints.append(self.best.verdict.worst_place(self.best.method, self.best.trajectory))
@@ -166,7 +166,7 @@ class MeshLoop:
 
     @property
     def ended(self) -> bool:
-        """Whether no new mesh is to be begun."""
+        """Whether no further mesh may begin."""
         return stopping() or (self.most_work is not None and self.work >= self.most_work)
 
     @property
@@ -176,8 +176,8 @@ class MeshLoop:
 
     @staticmethod
     def units(F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
-        """What counts as one in each objective (m,), see `objective_units`: at least a little of what it varies by near a vector of the
-        NLP, since an objective near zero is not judged by its own size."""
+        """The unit of each objective (m,), see `objective_units`: at least a small part of its variation near a vector of the NLP, since
+        the own size of an objective near zero is no measure."""
         return objective_units(F, stated_scales(nlp.problem.goals), LOOP.little * objective_variations(nlp, z))
 
     def on_mesh(
@@ -244,19 +244,19 @@ class MeshLoop:
         return found
 
     def _rank(self, one: OnMesh, task: Scalarised, least: float) -> tuple[bool, float]:
-        """Whether something is wrong with a point, and its largest error, in units of what it may be; what it is worse than what was
-        achieved counts like an error of its objectives."""
+        """Whether a point has complaints, and its largest error, in units of the tolerance; a loss against the achieved value counts like
+        an error of the objectives."""
         beyond = (task.loss(one.F) - least) / self.wanted.settled if self.wanted.confirmed else 0.0
         return bool(one.complaints()) or beyond > 1.0, max(one.error, beyond)
 
     def _improves(self, reached: OnMesh, present: OnMesh, task: Scalarised, least: float) -> bool:
-        """Whether a mesh with knots, or another point's, is one to go on with: its errors are not larger, and its optimum is no worse than
-        what was achieved."""
+        """Whether to continue on a mesh with knots, or of another point: its errors are not larger, and its optimum is no worse than the
+        achieved value."""
         errors = reached.verdict.error <= max(1.0, present.verdict.error)
         return errors and task.loss(reached.F) <= least + self.wanted.settled
 
     def _proposals(self, present: OnMesh, waiting: list[Meshed], knotted: bool) -> Iterator[Proposal]:
-        """The next mesh, and others to be tried where no solve converges on it."""
+        """The next mesh, and alternatives if no solve converges on it."""
         seen = {present.method}
         while waiting:
             hint = waiting.pop(0)
@@ -298,9 +298,9 @@ class MeshLoop:
     def _from_starts(
         self, nlp: NLP, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float, near_first: bool
     ) -> tuple[Solved, bool]:
-        """The best result of solves from the present trajectory and, if that fails or gets worse, near it, or the other way round, and
-        from others; and whether it is an optimum. Objectives without derivatives (a peak that is maximised) have the feasible point
-        nearest to the present one."""
+        """The best result of solves from the present trajectory and, if that fails or gets worse, near it (or in reverse order), then from
+        other starts; and whether it is an optimum. For objectives without derivatives (a maximised peak), the feasible point nearest to the
+        present one."""
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
@@ -329,14 +329,13 @@ def differentiable(problem: CompiledProblem) -> bool:
 
 
 def _achieved(point: OnMesh, task: Scalarised) -> float:
-    """The loss that the simulation of a point has for certain."""
+    """The loss that the simulation of a point certainly achieves."""
     return np.inf if point.achieved is None else task.loss(point.achieved) + point.doubt
 
 
 def _change(before: OnMesh, F: np.ndarray, task: Scalarised, settled: float) -> float:
-    """The largest change of the objectives that matter, in units, from those on the mesh before, or from those that its simulation
-    achieved, whichever is less: what a coarse mesh has wrong is no change of the point. Of objectives that are not `sharp`, a change of
-    `LOOP.blunt` counts as one of `settled`."""
+    """The largest change of the used objectives, in units, from the previous mesh or from its simulation, whichever is less: the error of a
+    coarse mesh is no change of the point. For objectives that are not `sharp`, a change of `LOOP.blunt` counts as one of `settled`."""
     known = [before.F] if before.achieved is None else [before.F, before.achieved]
     weights = np.where(task.sharp, 1.0, min(1.0, settled / LOOP.blunt)) / task.units
     return min(float((np.abs(F - one) * weights)[task.used].max()) for one in known)

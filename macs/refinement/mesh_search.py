@@ -1,7 +1,7 @@
-"""Optima on meshes that suit them: sought on coarse meshes, refined until simulations agree, with others looked at where one misleads.
+"""Optima with their meshes: solved on coarse meshes, refined until simulations agree, and compared with other meshes where one misleads.
 
-One search for all that is given no transcription: a single optimum, the ends of a front, and with these the mesh of a search. A coarse mesh
-may have no feasible point, or hide the best optimum; another one often has it. None decides alone.
+This search serves all calls without a transcription: a single optimum, the ends of a front, and with these the mesh of a search. A coarse
+mesh may have no feasible point, or hide the best optimum, which another mesh often shows. So no mesh decides alone.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ SECOND: Meshed = DFET(16, 3)
 
 @dataclass(frozen=True)
 class MeshSearchLimits:
-    """How meshes are searched, and when an optimum is good."""
+    """Limits of the search for meshes, and tolerances of an optimum."""
 
     optimum: float = 0.1  # what a single optimum may miss, as a part of what points may
     ends: float = 1.0  # the same for the ends of a front, on the mesh of a search: points get meshes of their own
@@ -76,7 +76,7 @@ def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
 
 
 def coarse_meshes(problem: Problem | CompiledProblem) -> list[Meshed]:
-    """Meshes to begin on, in the order in which they are tried: those that describe a guess, the problem's own, and coarse ones."""
+    """Meshes to begin on, in their order: meshes fine enough for a guess, the problem's own, and coarse ones."""
     own = default_transcription(problem)
     coarse = list(dict.fromkeys([own, *COARSE] if isinstance(own, Meshed) else COARSE))
     elements = guessed_elements(problem.compile())
@@ -86,8 +86,8 @@ def coarse_meshes(problem: Problem | CompiledProblem) -> list[Meshed]:
 
 
 def guessed_elements(problem: CompiledProblem) -> int:
-    """The least number of equal elements on which cubic polynomials describe each guessed profile of a problem, as far as such are
-    considered; the least of these if no profile is guessed."""
+    """The least of the considered numbers of equal elements on which cubic polynomials describe each guessed profile of a problem; the
+    least number of all if no profile is guessed."""
     guesses = (guess for phase in problem.phases for guess in phase.guesses.values())
     profiles = [guess for guess in guesses if np.ndim(guess) and np.ndim(guess[0]) == 1 and len(guess[0]) > 2]
     enough = (count for count in SEARCH.guessed if all(_missed(times, values, count) <= SEARCH.lost for times, values in profiles))
@@ -109,7 +109,7 @@ def _missed(times: np.ndarray, values: np.ndarray, count: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class MeshedOptimum:
-    """An optimum on a mesh that was found for it."""
+    """An optimum, and the mesh that suits it."""
 
     method: Meshed  # the coarse mesh that it came from
     coarse: NLP
@@ -136,22 +136,22 @@ class MeshedOptimum:
 
     @property
     def status(self) -> str:
-        """That of the solves on its mesh: what is refined is an optimum."""
+        """The status of the solves on its mesh: a refined result is an optimum."""
         return self.solved.status if self.refinement is None else CONVERGED
 
     @property
     def good(self) -> bool:
-        """Whether simulations agree with it as well as is wanted."""
+        """Whether simulations confirm it to the wanted tolerance."""
         return self.refinement is not None and not self.refinement.complaints() and not self.behind
 
     def certain(self, task: Scalarised) -> bool:
-        """Whether no other start is expected to lead to less: it is good, and all that were made led to it, or bounds allow no less."""
+        """Whether no other start is expected to improve it: it is good, and all starts led to it, or the bounds allow no smaller value."""
         alike = self.hits == self.rule.converged > 1
         return self.good and (alike or is_least(self.program, self.z, task))
 
     @property
     def optima(self) -> int:
-        """How many different optima starts on its coarse mesh found."""
+        """Number of different optima that starts on its coarse mesh found."""
         return self.rule.optima(SEARCH.clearly * self.unit)
 
     @property
@@ -161,7 +161,7 @@ class MeshedOptimum:
 
     @property
     def note(self) -> str:
-        """Why it is not good, or what else is to be said of it."""
+        """Why it is not good, or other remarks."""
         note = f"no solve converged: {self.solved.message}" if self.refinement is None else self.refinement.note
         behind = f"it is worse by {self.behind:.1e} of its size than what another one achieved when simulated" if self.behind else ""
         exhausted = "it ended at the most work of a default call: name a transcription" if note and self.exhausted else ""
@@ -169,7 +169,7 @@ class MeshedOptimum:
 
 
 class TaskOptima:
-    """The optima of one scalarised problem from several coarse meshes, and which of them is best."""
+    """The optima of one scalarised problem from several coarse meshes, and the best of them."""
 
     def __init__(self, loop: MeshLoop, task: Scalarised, end: int | None) -> None:
         self.loop, self.task, self.end = loop, task, end
@@ -200,7 +200,7 @@ class TaskOptima:
 
     @property
     def best(self) -> MeshedOptimum:
-        """The best by its errors, of which one is to be worse than what another one achieved."""
+        """The best by its errors; a loss against the value that another one achieved is one of the errors."""
         least, settled = min(one.achieved for one in self.all), self.loop.wanted.settled
         behind = [max((one.loss - least) / one.unit, 0.0) if np.isfinite(one.loss) and np.isfinite(least) else 0.0 for one in self.all]
         behind = [amount if amount > settled else 0.0 for amount in behind]
@@ -209,12 +209,13 @@ class TaskOptima:
 
     @staticmethod
     def _rank(one: MeshedOptimum, behind: float) -> tuple[bool, float]:
-        """Those that were refined first, by their errors, of which one is being behind; then the others by their violation."""
+        """Order: refined ones first, by their errors, which include a loss against others; then the rest by their violation."""
         return (True, one.solved.violation) if one.refinement is None else (False, max(one.refinement.best.error, behind))
 
     @property
     def passable(self) -> bool:
-        """Whether the best is known to be nearly as good as is wanted, in the spans of bounds: what states do may be little of these."""
+        """Whether the best is nearly within tolerance relative to the spans of bounds, which may be much wider than the ranges of the
+        states."""
         best = self.best
         if best.refinement is None:
             return False
@@ -225,7 +226,7 @@ class TaskOptima:
 
 
 class MeshSearch:
-    """Search for the optima of scalarised problems of one problem on meshes that suit them; with `ends`, they are the ends of its front."""
+    """Search for the optima of scalarised problems on suitable meshes; with `ends`, these are the ends of the problem's front."""
 
     def __init__(
         self,
@@ -246,7 +247,7 @@ class MeshSearch:
         self._budget = 0.5 * WORK.little if ends else WORK.little
 
     def go(self, coarse: Sequence[Meshed]) -> None:
-        """Solve on coarse meshes and refine what they lead to, until all is good or another mesh does not pay; then from other starts."""
+        """Solve on coarse meshes and refine the results, until all are good or another mesh does not pay; then solve from other starts."""
         left = list(coarse)
         while left:
             method = left.pop(0)
@@ -274,7 +275,7 @@ class MeshSearch:
 
     @property
     def _enough(self) -> bool:
-        """Whether no other coarse mesh is to be tried."""
+        """Whether no other coarse mesh is needed."""
         best = [optima.best for optima in self.tasks]
         if any(one.refinement is None for one in best):
             return self._hopeless >= SEARCH.hopeless or self.loop.ended
@@ -284,8 +285,8 @@ class MeshSearch:
         return all(one.good for one in best) or self.loop.ended or (passable and little)
 
     def _begin(self, method: Meshed) -> None:
-        """Solve all tasks on a coarse mesh, from further starts if these were not made yet, and refine what is best; where that leads to no
-        good point, also what the first start gave: an optimum that is better on a coarse mesh may be none."""
+        """Solve all tasks on a coarse mesh, from further starts if not yet done, and refine the best result; if that gives no good point,
+        also the result of the first start: a better optimum on a coarse mesh may be spurious."""
         nlp = self.loop.programs(method)
         self.solvers[method] = solver = MultistartSolver(nlp, self._given(nlp), self._starts or 1, self._rng, self.loop.solves)
         first, rules = list[Solved](), list[MultistartStopping]()
@@ -321,8 +322,7 @@ class MeshSearch:
         return optima.task.loss(solved.F) if solved.status == CONVERGED else None
 
     def _drawn(self, optima: TaskOptima, solver: MultistartSolver, known: Solved, rule: MultistartStopping, most: float) -> list[Solved]:
-        """Optima that starts that are drawn lead to on a coarse mesh, of which one is known, until there are enough, or `most` work is
-        done."""
+        """Optima of random starts on a coarse mesh, one of which is known, until there are enough starts, or `most` work is done."""
         found: list[Solved] = []
         nearby = known if known.status == CONVERGED else None
         with suppress(Stopped), self.loop.solves.at_most(MULTISTART.iterations):
@@ -334,8 +334,8 @@ class MeshSearch:
         return found
 
     def _elsewhere(self, i: int) -> None:
-        """Begin from other starts on coarse meshes where that was not done yet, as long as it takes little; refine what is better there
-        than the best optimum, or, where that is not good, what is different."""
+        """Solve from other starts on coarse meshes where not yet done, if that takes little work; refine results that are better than the
+        best optimum or, if that is not good, different from it."""
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
         others: list[tuple[float, Meshed, Solved, MultistartStopping]] = []
         budget = self._budget if self._ends else max(SEARCH.share * before, WORK.little)
@@ -352,7 +352,7 @@ class MeshSearch:
         loop.most_work = usual
 
     def _others(self, i: int, method: Meshed, most: float) -> list[tuple[float, Meshed, Solved, MultistartStopping]]:
-        """Other optima on a coarse mesh that are worth refining, and by how much they are worse there than the best, in its units."""
+        """Other optima on a coarse mesh that are worth refining, and their losses there against the best, in its units."""
         loop, optima = self.loop, self.tasks[i]
         best = optima.best
         if loop.ended or loop.work >= most or best.refinement is None:
@@ -378,7 +378,7 @@ class MeshSearch:
 
 @dataclass(frozen=True)
 class SearchMeshes:
-    """Where a problem is solved for which no transcription is given."""
+    """The transcriptions for a problem without a stated one."""
 
     search: Transcription  # for the candidates of a search: cheap
     fine: Meshed | None  # a finer mesh, where one is needed for points that a simulation confirms
@@ -417,7 +417,7 @@ def search_meshes(
 
 
 def _chosen(search: MeshSearch, limits: float) -> SearchMeshes:
-    """The mesh of a search: that of the best ends; the fine one has the elements of all meshes that suit these."""
+    """The coarse mesh of a search, that of the best ends, and the fine one, which has the elements of all meshes of these ends."""
     loop, best = search.loop, [search.best(i) for i in range(len(search.tasks))]
     counts, own = loop.solves.counts, [i for i, one in enumerate(best) if one.refinement is not None]
     if not own:
@@ -465,8 +465,8 @@ def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Meshed:
 
 
 def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
-    """A mesh with the edges of several, without those that divide what no single mesh divides as finely. Its degree is one above theirs:
-    points between the ends may be harder than these."""
+    """A mesh with the edges of several, without edges that would make elements shorter than in any single mesh. Its degree is one above
+    theirs: points between the ends may be harder than these."""
     edges = sorted({edge for mesh in meshes for edge in mesh.edges})
     while len(edges) > 2:
         joined = np.array(edges[2:]) - np.array(edges[:-2])
