@@ -78,7 +78,7 @@ def mended(
 
 
 def resolve_unverified(points: Points, verify: float) -> Points:
-    """The points in their order, the unverified ones re-solved. Points without a simulation are simulated first."""
+    """The points in their order, the unverified ones re-solved. They are simulated first if none was."""
     with working(None, None) as (show, interrupts):
         job = _Mending(points, verify, show)
         return job.with_costs(job.with_reasons(job.resolve_unverified()), interrupts.elapsed, interrupts.reason)

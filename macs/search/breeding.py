@@ -2,12 +2,13 @@
 
 The agents are few, and each searches near its own position. The archive covers the whole front, and the differences of its points lead
 along the front: crossover exchanges coordinates between two points, and the difference of two points is a step for a third. Crossover suits
-separable problems with many local fronts, differences suit coupled variables. So that is used more often whose offspring the archive keeps.
+separable problems with many local fronts, differences suit coupled variables. The operator with more offspring in the archive is used more
+often.
 
 As long as nothing is feasible the archive is empty, and the least violated points are bred likewise: they are ordered by one number, and a
-generation of children with coordinates of both parents lowers it sooner than steps of single agents. Parents are then the better of two
-(Goldberg and Deb 1991), and steps of mutation longer. Later, infeasible points with better objectives than the archive's are bred with it:
-feasible parts may be apart from each other.
+generation of children with coordinates of both parents lowers it sooner than steps of single agents. Tournaments of two then choose the
+parents (Goldberg and Deb 1991), and mutation steps are longer. Later, infeasible points with better objectives than the archive's are bred
+with it: the feasible set may have separate parts.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ DIFFERENCE_WEIGHT = 0.5
 
 @dataclass(frozen=True)
 class Breeding:
-    """How offspring are made. Indices are those of distributions: a higher one puts offspring nearer to their parents (Deb and Agrawal
+    """Parameters of breeding. Indices are those of distributions: a higher one puts offspring nearer to their parents (Deb and Agrawal
     1995)."""
 
     # Part of the children that are made by differences, the others by crossover; None: by what the archive has kept of both.
@@ -116,8 +117,8 @@ def breed(
 
 
 def breed_archive(trials: Trials) -> None:
-    """Breed offspring of the archive's points, or of the least violated ones as long as nothing is feasible, from as many parents as
-    possible, and one of each infeasible point that is better than the archive."""
+    """Breed offspring of the archive's points, or of the least violated points as long as nothing is feasible, from as many parents as
+    possible; and one of each infeasible point with better objectives than the archive."""
     state, settings, evaluator, box, rng = trials.state, trials.settings, trials.evaluator, trials.box, trials.state.rng
     parents, m, feasible = state.parents, len(state.ideal), len(state.archive) > 0
     undirected = min(max(len(state.agents) - settings.agents, 0), settings.agents)

@@ -1,9 +1,9 @@
-"""Gradient actions: the solves with which a search begins, those of single agents, those of later rounds, and the polish at its end.
+"""Gradient actions: the first solves of a search, those of single agents, those of later rounds, and the polish at its end.
 
 This module has all calls of gradient solves from the search. A solve of an agent leads from a point to the front by the scalarisation of
 Pascoletti and Serafini (1984): minimise alpha subject to F - reference <= alpha weights. If the reference is the objectives of the point
 itself, no objective may get worse, wherever the solve begins: such a solve is called guarded. Its result is used only if it is feasible and
-indeed no worse.
+no worse.
 """
 
 from __future__ import annotations
@@ -90,8 +90,8 @@ class Opening:
         self.evaluations.append(found)
 
     def _solver(self) -> MultistartSolver | None:
-        """Solver that begins at the best of the vectors that were given; where none were, at the problem's guess, as gradient tools do;
-        without one, at the candidate that misses least. None if that is no number."""
+        """Solver that begins at the best given vector; without any, at the problem's guess, as gradient tools do; without a guess, at the
+        least violated candidate. None if its violation is not finite."""
         assert isinstance(self._evaluator, Bilevel)
         seen, given = self.population, slice(self._given)
         known = np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1)
@@ -117,8 +117,8 @@ class Opening:
         return solver.with_feasible_start(solved, task).status == CONVERGED or solver.closest is not None
 
     def _solved(self, solver: MultistartSolver) -> Evaluation:
-        """The ends of the front, and a compromise of them; where the search chooses its ways, points along the front instead, each from as
-        many starts as pay. Fewer if asked to end early, or where none was found."""
+        """The ends of the front and a compromise between them; where the search chooses its inner solvers, points along the front instead,
+        each by multistart. Fewer if asked to end early, or if solves fail."""
         found = lexicographic_ends(solver)
         self.multimodal = any(one.optima() > 1 for one in solver.stopping.values())
         for i, one in solver.stopping.items():
@@ -138,9 +138,9 @@ class Opening:
 def restart_solves(
     archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, unimodal: np.ndarray, rng: np.random.Generator
 ) -> tuple[Evaluation, bool]:
-    """What `count` gradient solves from other starts find, for the ends of the front and points along it in turn; fewer if asked to end
-    early; and whether one of them ended at a worse optimum than is known. Where starts led to several optima for some objectives only,
-    other ends are not sought."""
+    """The results of `count` gradient solves from other starts, for the ends of the front and points along it in turn; fewer if asked to
+    end early; and whether one of them ended at a worse optimum than the known one. If only some objectives have several optima, only their
+    ends are solved again."""
     solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, _counted_by(evaluator))
     m, span = archive.F.shape[1], ranges(archive.F)
     ends = archive.F[extremes(archive.F)]
@@ -165,7 +165,7 @@ def restart_solves(
 
 
 def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) -> None:
-    """Make the gradient solves from other starts with which a round begins, where the search chooses its inner solver."""
+    """Make the gradient solves from other starts at the beginning of a round, where the search chooses its inner solver."""
     rounds = state.rounds
     if rounds is None or not (settings.refines and evaluator.has_gradients and evaluator.ways and len(state.archive)):
         return
@@ -191,7 +191,7 @@ def gradient_actions(state: SearchState, settings: Settings, evaluator: Evaluato
 
 def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator, guide: Guide | None) -> np.ndarray | None:
     """Polish the archive, at the end of the search or of a round, unless the round found nothing new. Returns the objectives (k, m) of all
-    that was found; None if the polish was asked to end early: it then continues at the next call."""
+    new points; None if the polish was asked to end early: it then continues at the next call."""
     memory, rounds = state.gradients, state.rounds
     if memory.polishing is None:
         if rounds is not None and memory.polished is not None and not rounds.has_improvement(state.archive.F):
@@ -275,7 +275,7 @@ def ranges_of(state: SearchState) -> np.ndarray:
 
 
 def _counted_by(evaluator: Evaluator) -> GradientSolves:
-    """Gradient solves whose counts are the evaluator's, and before each of which it does what it does before a batch."""
+    """Gradient solves that the evaluator counts, and before each of which it does its work before a batch."""
     solves = GradientSolves(evaluator.tolerance)
     solves.before, solves.counts = evaluator.before_batch, evaluator.counts
     return solves

@@ -25,7 +25,7 @@ there."""
 
 @dataclass(frozen=True)
 class Region:
-    """Region of interest of a preference on a front: where its value is worse than the best by at most `REGION_PART` of the spread.
+    """Region of interest of a preference on a front: its value is worse than the best by at most `REGION_PART` of the spread.
 
     The value is that of the first stage, see `Ranking.values`, and the spread is over the points that meet the preference's hard limits:
     those that exceed one lie outside. If all do, the value is by how much.
@@ -46,7 +46,7 @@ class Region:
         return cls(stage, bool(met.any()), float(values.min()), float(np.ptp(values)))
 
     def away(self, objectives: np.ndarray) -> np.ndarray:
-        """By how much the values (n,) at objectives (n, m) are worse than the best, in units of the spread: 0 and less is as good."""
+        """Losses (n,) at objectives (n, m) against the best value, in units of the spread; at most 0 if as good."""
         values = self.stage.numbers(objectives) if self.limited else self.stage.excess(objectives)
         return (values - self.best) / (self.spread or 1.0)
 
@@ -118,7 +118,7 @@ def guide_of(preference: Preference | None, evaluator: Evaluator) -> Guide | Non
 
 
 def written(preference: Preference) -> Any:
-    """A preference as plain data, for files; that of a class of the user's own as its text."""
+    """A preference as plain data, for files; one of a user's own class as its text."""
     return to_dict(preference) if type(preference) in METHODS.values() else repr(preference)
 
 

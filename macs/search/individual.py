@@ -4,8 +4,8 @@ The functions `inertia`, `coordinate_step`, `differential` and `along_archive` r
 positions X (k, d) in the unit box; they evaluate nothing. The proposals of all agents are evaluated together, and the agents without
 success try the next action (Ricciardi and Vasile 2015, section 3.1).
 
-Agents without a direction, in long searches, reach parts of the front that the archive, which keeps what is non-dominated at the moment,
-has lost. Where a front is a surface they try all coordinates, and then differences of points of the archive.
+In long searches, agents without a direction reach parts of the front that the archive of presently non-dominated points has lost. Where a
+front is a surface, they try all coordinates, and then differences of points of the archive.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def distinct_others(agents: np.ndarray, population: int, count: int, rng: np.ran
 
 
 def acting_agents(count: int, directed: int, excess: float, rng: np.random.Generator) -> np.ndarray:
-    """Rows of the agents that act in an iteration: the `directed` ones, and of the others after them at most as many, drawn at random; none
-    of these if they had evaluations in excess of their share."""
+    """Rows of the agents that act in an iteration: the `directed` ones, and at most as many of the others after them, drawn at random; none
+    of these while their evaluations exceed their share."""
     others = max(count - directed, 0)
     if not others or excess > 0.0:
         return np.arange(min(count, directed))
@@ -79,8 +79,8 @@ def acting_agents(count: int, directed: int, excess: float, rng: np.random.Gener
 
 
 def share_evaluations(state: SearchState, gained: np.ndarray, tried: np.ndarray, directed: int) -> None:
-    """Credit agents for what they gained (n,) in so many evaluations (n,): those without a direction, after the `directed` ones, have the
-    part of all evaluations that they gain in one, relative to what the others do."""
+    """Credit agents for gains (n,) in so many evaluations (n,): the share of evaluations of agents without a direction, after the
+    `directed` ones, is their gain for each evaluation relative to that of the others."""
     parts = (slice(None, directed), slice(directed, None))
     state.undirected.add(*(np.array([one[part].sum() for part in parts]) for one in (gained, tried)))
     rates = state.undirected.rates()

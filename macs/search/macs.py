@@ -1,4 +1,4 @@
-"""MACS: Multi-Agent Collaborative Search, its iterations (Algorithm 1 of Ricciardi, Vasile and Maddock 2016) and what follows them."""
+"""MACS: Multi-Agent Collaborative Search, its iterations (Algorithm 1 of Ricciardi, Vasile and Maddock 2016) and its final steps."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class MACS(Settings, Solver):
         return state
 
     def _first_vectors(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None) -> np.ndarray:
-        """Full vectors (k, D) of the first population: those given, then a Latin hypercube, within the budget."""
+        """Full vectors (k, D) of the first population: the given ones, then a Latin hypercube, within the budget."""
         box = evaluator.box
         missing = self.points_to_sample(budget) - (0 if start is None else len(start))
         batches = [] if start is None else [np.asarray(start, dtype=float)]
@@ -195,8 +195,8 @@ class MACS(Settings, Solver):
         return state.rounds.end
 
     def ended(self, state: SearchState) -> str:
-        """See `SearchMethod.ended`: "settled" where solves for feasibility from many places end at violations that can get no smaller,
-        since more of them would take long and find nothing."""
+        """See `SearchMethod.ended`: "settled" if feasibility solves from many places all end at local minima of the violation, since more
+        of them would take long and find nothing."""
         if not len(state.archive) and state.gradients.hopeless >= HOPELESS_CANDIDATES:
             return "settled"
         return "" if state.rounds is None else state.rounds.stopped

@@ -1,11 +1,11 @@
 """Repair: infeasible points that may be better than the archive's are moved to feasible ones nearby, by linear models of the constraints.
 
 Where constraints are equalities, or leave little room, hardly any proposal is feasible. For trajectories the inner level moves each to a
-feasible one. A black box has no derivatives, but residuals at points nearby: the model of a constraint is the linear function that fits
-these best, the nearest most; where they are too few for that, the flattest of all (Conn, Scheinberg and Vicente 2009, chapters 4 and 5).
-The step is the shortest to the zero of all models, as with gradients in the repair of Chootinan and Chen (2006). Each costs one evaluation,
-and makes the models better. As many points are repaired as pays: where constraints are thin the archive keeps hardly any other point, and
-where infeasible parts are wide hardly any repaired one.
+feasible one. A black box has no derivatives, but residuals at points nearby: the model of a constraint is the linear function with the best
+fit, weighted by distance; with too few points, the flattest fit (Conn, Scheinberg and Vicente 2009, chapters 4 and 5). The step is the
+shortest to the zero of all models, as with gradients in the repair of Chootinan and Chen (2006). Each step costs one evaluation, and
+improves the models. The number of repairs follows their success: on thin feasible sets the archive keeps hardly any other point, and where
+infeasible parts are wide hardly any repaired one.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .trials import Trials
 
 @dataclass(frozen=True)
 class RepairLimits:
-    """How far repair goes in an iteration (measured on MW1 to MW14 and on problems with equalities)."""
+    """Limits of repair in an iteration (measured on MW1 to MW14 and on problems with equalities)."""
 
     steps: int = 6  # of a point
     lower: float = 0.5  # another step is made only if the last one has lowered the violation to this part
@@ -32,7 +32,7 @@ class RepairLimits:
 
 @dataclass(frozen=True)
 class ModelLimits:
-    """Of the linear models of constraints."""
+    """Parameters of the linear models of constraints."""
 
     points: int = 40  # most points that a model is made of; else two for each variable and two more; signs need twice as many
     flat: float = 1e-6  # singular values below this part of the largest count as zero: of the points around
@@ -50,8 +50,8 @@ OTHERS, REPAIRED = 0, 1
 
 
 def repair(trials: Trials, seen: Sequence[Evaluation]) -> None:
-    """Repair some of the points that were evaluated in this iteration, drawn from those that are infeasible and that the archive does not
-    dominate; keep the residuals of all.
+    """Repair some of the points of this iteration, drawn from the infeasible ones that the archive does not dominate; keep the residuals of
+    all.
 
     Their number is the ratio of two success rates, of steps of repair and of other evaluations, at least one. A success is to be in the
     archive.
@@ -88,20 +88,20 @@ def repair(trials: Trials, seen: Sequence[Evaluation]) -> None:
 
 
 def _promising(state: SearchState, F: np.ndarray, violation: np.ndarray, tolerance: float) -> np.ndarray:
-    """Rows of the points with F (k, m) and violations (k,) that are infeasible, but not dominated by a point of the archive."""
+    """Rows of the points with F (k, m) and violations (k,) that are infeasible and not dominated by the archive."""
     rows = np.flatnonzero((violation > tolerance) & np.isfinite(violation))
     return rows[~np.any(dominates(state.archive.F[:, None], F[rows]), axis=0)]
 
 
 def _keep_residuals(state: SearchState, trials: Trials, one: Evaluation) -> None:
-    """Keep the residuals of evaluated points, but for those whose evaluation failed."""
+    """Keep the residuals of evaluated points, except failed evaluations."""
     assert one.residuals is not None
     fine = np.isfinite(one.violation)
     state.samples = state.samples.joined(trials.box.to_unit(one.Z[fine][:, trials.evaluator.free]), one.residuals[fine])
 
 
 def steps_to_zero(box: UnitBox, X: np.ndarray, residuals: np.ndarray, samples: ResidualSamples) -> np.ndarray:
-    """Steps (k, d) from points X (k, d) to where the models of their residuals (k, c) are zero, or as near to it as the bounds allow.
+    """Steps (k, d) from points X (k, d) to the zero of the models of their residuals (k, c), or as near to it as the bounds allow.
 
     A constraint without a residual at a point has no part in its step. No step is longer than the distance of the farthest point that its
     models are made of. It is zero where no other point is known.

@@ -1,8 +1,8 @@
 """Rounds of a search without a number of evaluations, and the rule by which it ends: more work no longer changes the front.
 
-A round is a search of some evaluations and, with gradients, a polish. At its end the points that were found are compared with the front as
-it was when it was last improved. That the archive's points were spread anew is no progress: a point counts only if it lies beyond the known
-front, with straight lines between its points, by more than a tolerance. All decisions depend on counts, so the same seed ends alike.
+A round is a search of some evaluations and, with gradients, a polish. At its end, its points are compared with the front of the last
+improvement. A new spacing of the archive's points is no progress: a point counts only if it lies beyond the known front, with straight
+lines between its points, by more than a tolerance. All decisions depend on counts, so the same seed ends alike.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DONE, CEILING = "done", "ceiling"
 
 @dataclass(frozen=True)
 class RoundLimits:
-    """When a round ends, what counts as progress, and when there is no other round (measured on the catalogue and standard problems)."""
+    """When a round ends, the tolerance of progress, and when no round follows (measured on the catalogue and standard problems)."""
 
     first: int = 150  # evaluations of the first round, and least number of a later one, with gradients
     first_without: int = 2_000  # the same without
@@ -71,7 +71,7 @@ class Rounds:
         return cls(finished=0, end=min(shortest, ceiling), improved=0, work=0, opened=0, front=none, extent=np.zeros(m), violation=np.inf)
 
     def has_improvement(self, found: np.ndarray) -> bool:
-        """Whether any of the points with F (k, m) lies beyond the front, so that a polish may make progress of it."""
+        """Whether any of the points with F (k, m) lies beyond the front, so that a polish may lead to progress."""
         if not (len(found) and len(self.front)):
             return len(found) > 0
         ideal, span = _frame(np.vstack([self.front, found]), self.extent)
@@ -90,8 +90,8 @@ def next_round(
     multimodal: bool,
     ceiling: int,
 ) -> Rounds:
-    """The rounds after one has ended that found objectives (k, m), with feasible agents (a, m): with the next one, or the reason why there
-    is none."""
+    """The rounds after the end of one with new objectives (k, m) and feasible agents (a, m): with the next round, or the reason why none
+    follows."""
     shortest, little = (ROUND_LIMITS.first, WORK.little) if gradients else (ROUND_LIMITS.first_without, 0.0)
     seen = np.vstack([found, feasible])
     extent = np.fmax(rounds.extent, np.ptp(seen, axis=0)) if len(seen) else rounds.extent
@@ -117,13 +117,13 @@ def next_round(
 
 
 def improves(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> bool:
-    """Whether points with F (k, m) improve a front (n, m): the gains of those that lie beyond it are more than little."""
+    """Whether points with F (k, m) improve a front (n, m): those beyond it have gains above the tolerance."""
     hypervolume, mean, end = gains(found, front, extent, directions)
     return hypervolume > ROUND_LIMITS.progress or mean > ROUND_LIMITS.progress or end > ROUND_LIMITS.ends
 
 
 def gains(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> tuple[float, float, float]:
-    """The gains by points with F (k, m) that lie beyond a front (n, m)."""
+    """The gains of points with F (k, m) that lie beyond a front (n, m)."""
     ideal, span = _frame(np.vstack([front, found]), extent)
     new = found[beyond((found - ideal) / span, (front - ideal) / span) > ROUND_LIMITS.beyond]
     if not len(new):
@@ -154,7 +154,7 @@ def beyond(F: np.ndarray, front: np.ndarray) -> np.ndarray:
 
 
 def _joined(point: np.ndarray, front: np.ndarray, alone: float) -> float:
-    """The distance of a point (m,) beyond the points of a front that are near it, and what lies between these."""
+    """The distance of a point (m,) beyond the points of a front near it, and beyond the lines or planes between these."""
     from scipy.optimize import linprog
 
     m, apart = len(point), np.linalg.norm(front - point, axis=1)

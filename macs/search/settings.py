@@ -1,4 +1,4 @@
-"""Settings of MACS, and the variants of its search: its own and that of the paper."""
+"""Settings of MACS, and the variants of its search: the default and that of the paper."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ GONE = {
 
 
 def refuse_gone(settings: Iterable[str]) -> None:
-    """Raise ValueError that says what to use, if one of these names is a setting of a former version."""
+    """Raise ValueError that says what to use, if one of these names is a setting of an earlier version."""
     for name in settings:
         if name in GONE:
             raise ValueError(f"MACS: {name} is no setting any more: {GONE[name]}")
@@ -100,7 +100,7 @@ UNDIRECTED = Undirected()
 
 @dataclass(frozen=True)
 class Offspring:
-    """Offspring of each point of the archive in an iteration (measured on ZDT, UF, DTLZ and MW)."""
+    """Number of offspring of each point of the archive in an iteration (measured on ZDT, UF, DTLZ and MW)."""
 
     curve: float = 0.15  # with up to two objectives, or beside agents without a direction: most of the budget is left to the agents
     surface: float = 1.0
@@ -282,8 +282,8 @@ class Settings:
         return self.agents if self.variant == PAPER else max(self.agents, min(self.archive, budget // 20))
 
     def offspring(self, parents: int, m: int, undirected: int = 0, feasible: bool = True) -> int:
-        """Number of offspring of so many parents in an iteration, with m objectives, in which so many agents without a direction act: at
-        least one for each agent; 0 without parents."""
+        """Number of offspring of so many parents in an iteration with m objectives and so many acting agents without a direction: at least
+        one for each agent; 0 without parents."""
         if not (self.variant.breeding and parents):
             return 0
         each = OFFSPRING.curve if m <= CURVE or (m <= MANY and undirected > 0) else OFFSPRING.surface

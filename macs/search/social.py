@@ -17,7 +17,7 @@ FEWEST_PARENTS = 4
 
 
 def nearest_rows(box: UnitBox, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray:
-    """Rows (k, <= count) of the `count` points of the pool (p, d) that are nearest to each of X (k, d), points equal to it left out.
+    """Rows (k, <= count) of the `count` points of the pool (p, d) nearest to each of X (k, d), without points equal to it.
 
     Missing rows are -1.
     """
@@ -68,7 +68,7 @@ def social_actions(trials: Trials) -> None:
 
 
 def direction_shares(state: SearchState, guide: Guide | None) -> np.ndarray | None:
-    """Shares (k,) of the directions in what is drawn, as densely as points are wanted where they lead; None if that is uniform.
+    """Shares (k,) of the directions in the draw, by the wanted density of points where they lead; None if that is uniform.
 
     A direction leads to the point of the archive that is best in it.
     """

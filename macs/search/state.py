@@ -76,7 +76,7 @@ class Agents:
 
 @dataclass
 class Credit:
-    """What each of k ways of search has gained, and what that cost; older gains count less (compare Thierens 2005)."""
+    """Gains and costs of each of k ways of search; older gains count less (compare Thierens 2005)."""
 
     SHAPES: ClassVar[dict[str, str]] = {"gained": "k", "cost": "k"}
 
@@ -89,11 +89,11 @@ class Credit:
         return cls(np.ones(count), np.full(count, 5.0))
 
     def add(self, gained: np.ndarray, cost: np.ndarray) -> None:
-        """Give credit (k,) to each, after a part of the former was forgotten."""
+        """Give credit (k,) to each, after forgetting a part of the earlier credit."""
         self.gained, self.cost = (1.0 - FORGET) * self.gained + gained, (1.0 - FORGET) * self.cost + cost
 
     def rates(self, prior: float = 0.0) -> np.ndarray:
-        """What each (k,) has gained for its cost; with a prior, a way without a success may have one later."""
+        """Gain for each unit of cost (k,); with a prior, so that a way without a success gets further trials."""
         return (self.gained + prior) / (self.cost + 1.0)
 
 
@@ -129,7 +129,7 @@ class ResidualSamples:
 
 @dataclass
 class GradientMemory:
-    """What gradient solves have found out that decides on later ones."""
+    """Results of gradient solves that later ones depend on."""
 
     SHAPES: ClassVar[dict[str, str]] = {"unimodal": "m bool", "failed_pairs": "v 2m"}
 
@@ -173,7 +173,7 @@ class SearchState:
 
     @property
     def closest(self) -> Archive:
-        """The least violated point, as long as no point was feasible; no row once the archive has points."""
+        """The least violated point, as long as no point is feasible; no row once the archive has points."""
         return self.infeasible.take(np.arange(0 if len(self.archive) else min(1, len(self.infeasible))))
 
     @property

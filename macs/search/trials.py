@@ -1,9 +1,9 @@
 """Evaluation of proposals: which inner solver each goes to, and whether its agent moves there.
 
-What a way of making candidates feasible is worth differs from problem to problem, and during a search: where the ends of trajectories are
-free, propagation finds a front in no time; where they are fixed, nothing that is only propagated is feasible. So most proposals go to the
-inner solver that has brought most for its work, and a little to the others. Gradient solves compete, too: where these bring most, proposals
-are only propagated, since they are what the solves begin from. Work is counted, not timed.
+The value of an inner solver differs from problem to problem, and during a search: where the ends of trajectories are free, propagation
+finds a front quickly; where they are fixed, no propagated candidate is feasible. So most proposals go to the inner solver with the largest
+gain for its work, and a few to the others. Gradient solves compete, too: where they gain most, proposals are only propagated, as starts of
+the solves. Work is counted, not timed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ WORK, EVALUATIONS, FEASIBLE = range(3)
 
 @dataclass(frozen=True)
 class InnerShares:
-    """What goes to the inner solvers that do not bring most (measured on the catalogue's problems)."""
+    """Shares of the inner solvers that do not gain most (measured on the catalogue's problems)."""
 
     cheaper: float = 0.1  # least share of all evaluations of one that takes less work than that which brings most
     dearer: float = 0.15  # share of all work, with the gradient solves to come, of those that take more
@@ -40,8 +40,8 @@ INNER_SHARES = InnerShares()
 
 
 def initial_credit(evaluator: Evaluator, variables: int, gradients: bool) -> tuple[Credit, np.ndarray]:
-    """Credit and spending of the inner solvers and of gradient solves, which are believed to bring a whole front each until they were
-    tried. Without gradients there is nothing to choose: what is only propagated would never be made feasible."""
+    """Credit and costs of the inner solvers and of gradient solves; each has the credit of a whole front until it is tried. Without
+    gradients there is no choice: propagated candidates would never be made feasible."""
     rows = len(evaluator.ways) + 1 if gradients and evaluator.ways else 0
     credit = Credit(np.zeros(rows), np.zeros(rows))
     credit.gained[-1:], credit.cost[-1:] = 1.0, INNER_SHARES.solve * variables
@@ -49,8 +49,8 @@ def initial_credit(evaluator: Evaluator, variables: int, gradients: bool) -> tup
 
 
 def choose_inner_solvers(credit: Credit, spent: np.ndarray, count: int, every: int | None, compiling: float = 0.0) -> np.ndarray:
-    """The inner solver (count,) that each of the next proposals goes to: that which brings most for its work, or the first where gradient
-    solves do, one of which is made for `every` evaluations in the end; or those that have not had their shares."""
+    """The inner solver (count,) of each of the next proposals: the one with the largest gain for its work; the first where gradient solves
+    gain most, one of which is made for `every` evaluations in the end; or those below their shares."""
     rate, ways = credit.rates(), spent[:-1]
     main = int(np.argmax(rate)) % len(ways)
     evaluations = ways[:, EVALUATIONS].sum()
@@ -75,7 +75,7 @@ def choose_inner_solvers(credit: Credit, spent: np.ndarray, count: int, every: i
 
 
 def give_credit(state: SearchState, way: int, gained: float, work: int, count: int, feasible: int = 0) -> None:
-    """Credit an inner solver, or gradient solves (-1), for what `count` evaluations or solves brought."""
+    """Credit an inner solver, or gradient solves (-1), for the gain of `count` evaluations or solves."""
     if len(state.spent):
         one = np.zeros(len(state.spent))
         one[way] = 1.0
@@ -84,8 +84,8 @@ def give_credit(state: SearchState, way: int, gained: float, work: int, count: i
 
 
 class Gains:
-    """What points bring to a front: by how much they improve the best values of its directions, on average, each of which counts one from
-    the ideal point to the nadir. As long as there is no front, none counts."""
+    """Gains of points: the mean improvement of the best values of a front's directions, in units of the way from the ideal point to the
+    nadir; zero as long as there is no front."""
 
     def __init__(self, state: SearchState, tolerance: float) -> None:
         self._directions, self._tolerance = state.directions, tolerance
@@ -94,7 +94,7 @@ class Gains:
         self._best: np.ndarray | None = None  # best values, computed when they are needed
 
     def of(self, seen: Evaluation) -> float:
-        """What these points bring, which then count as known."""
+        """The gain of these points, which then count as known."""
         F = seen.F[seen.violation <= self._tolerance]
         if not len(self._front) or not len(F):
             return 0.0
@@ -128,8 +128,8 @@ class Trials:
         return self.box.to_unit(Z[:, self.evaluator.free])
 
     def evaluate(self, Z: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
-        """Evaluate proposals (k, d), made from full vectors Z (k, D) with unit coordinates X (k, d), as far as they differ and the budget
-        goes; no agent moves. Returns their rows (j,), and the results."""
+        """Evaluate those proposals (k, d) that differ from X (k, d), the unit coordinates of the full vectors Z (k, D) they come from,
+        within the budget; no agent moves. Returns their rows (j,), and the results."""
         moved = np.flatnonzero((trial != X).any(axis=1))[: max(self.budget - self.state.evaluations, 0)]
         if not moved.size:
             return moved, None
@@ -142,8 +142,8 @@ class Trials:
         return moved, result
 
     def _evaluated(self, Z: np.ndarray) -> Evaluation:
-        """The evaluation of full vectors (k, D), each by the inner solver that is worth most now. As long as nothing is feasible, and
-        without gradients, all go to the evaluator's own."""
+        """The evaluation of full vectors (k, D), each by the presently best inner solver. As long as nothing is feasible, and without
+        gradients, all go to the evaluator's own."""
         state, counts = self.state, self.evaluator.counts
         if not len(state.spent) or not len(state.archive):
             return self.evaluator.evaluate(Z)
@@ -187,8 +187,8 @@ class Trials:
         return success
 
     def _improvement(self, rows: np.ndarray, result: Evaluation) -> np.ndarray:
-        """By how much each of these results (k,) improves its agent, which it dominates: the mean over the objectives, in ranges of the
-        front, each at most 1. Of an infeasible agent it is the part of the violation that is gone."""
+        """The improvement (k,) of each agent by the result that dominates it: the mean over the objectives, in ranges of the front, each at
+        most 1. For an infeasible agent, it is the fraction by which the violation falls."""
         state, tolerance = self.state, self.evaluator.tolerance
         F, violation = state.agents.F[rows], state.agents.violation[rows]
         span = np.where(state.nadir > state.ideal, state.nadir - state.ideal, 1.0)
