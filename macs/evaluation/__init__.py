@@ -1,1 +1,1 @@
-"""What can be searched: the contract, optimal control problems and black boxes."""
+"""Evaluators, which a search calls: the contract, optimal control problems and black boxes."""

@@ -1,4 +1,4 @@
-"""Vector problems: made of plain functions or of pymoo problems, evaluated for a search, and evaluated again in the end."""
+"""Vector problems: built from plain functions or pymoo problems, evaluated for a search, and evaluated again at its end."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def learned(known: int | None, count: int, source: str) -> int:
 
 @dataclass(frozen=True)
 class PlainRows:
-    """A plain function, with constraints of its own or apart, as `problems.vector.Rows`."""
+    """A plain function, with its constraints in its values or as a separate function, as `problems.vector.Rows`."""
 
     function: Callable[[np.ndarray], Outputs]
     constraints: Callable[[np.ndarray], np.ndarray] | None

@@ -261,7 +261,7 @@ class Evaluator(ABC):
         raise NotImplementedError(f"{type(self).__name__} does not name its objectives")
 
     def resume(self, counts: Counts, m: int) -> None:
-        """Continue with the counts of an earlier run, which had m objectives."""
+        """Continue with the counts of an earlier run with m objectives."""
         self.counts = counts
 
     def check_budget(self, budget: int) -> None:

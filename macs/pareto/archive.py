@@ -15,7 +15,7 @@ from .spread import Guide, best_of_each, of_low_energy, pair_energies, reach, sp
 
 @dataclass(frozen=True, repr=False)
 class Archive:
-    """Evaluated points as columns. Those that `insert` returns are feasible, mutually non-dominated and different."""
+    """Evaluated points as columns. The points that `insert` returns are feasible, mutually non-dominated and different."""
 
     SHAPES: ClassVar[dict[str, str]] = {"Z": "n D", "F": "n m", "violation": "n"}
 
@@ -43,11 +43,11 @@ class Archive:
         return type(self)(*(values[rows] for values in self.columns()))
 
     def joined(self, others: Self) -> Self:
-        """The points of this archive, then the others, all of them."""
+        """All points of this archive, then all others."""
         return type(self)(*map(np.concatenate, zip(self.columns(), others.columns(), strict=True)))
 
     def has(self, F: np.ndarray) -> np.ndarray:
-        """Mask (k,) of the objectives F (k, m) that are those of a point."""
+        """Mask (k,) of the objectives F (k, m) that a point of the archive has."""
         return among(F, self.F)
 
     def replaced(self, rows: np.ndarray, others: Any) -> Archive:
@@ -77,8 +77,8 @@ def insert(
 def outside(
     known: Archive, archive: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray, *, limit: int, tolerance: float
 ) -> Archive:
-    """The infeasible points, at most `limit`, that no point of the archive dominates, non-dominated among themselves by their objectives,
-    of `known` and of the points Z (k, D), F (k, m), violation (k,).
+    """At most `limit` infeasible points, from `known` and Z (k, D), F (k, m), violation (k,), with mutually non-dominated objectives that
+    no point of the archive dominates.
 
     They may lead to feasible points that are better than those of the archive, behind what is infeasible (Li, Chen, Fu and Yao 2019).
     """
@@ -113,8 +113,8 @@ def truncate(F: np.ndarray, limit: int, members: np.ndarray, exponent: float | N
 
 
 def least_violated(closest: Archive, Z: np.ndarray, F: np.ndarray, violation: np.ndarray, limit: int = 1) -> Archive:
-    """The least violated points, at most `limit`, of `closest` and the points Z (k, D), F (k, m), violation (k,), in this order; of equal
-    ones the first. The first row is there even if all evaluations failed, the others have finite violations."""
+    """At most `limit` least violated points, from `closest` and Z (k, D), F (k, m), violation (k,), in this order; of equal points the
+    first. The first row exists even if all evaluations failed, the others have finite violations."""
     every = closest.joined(Archive(Z, F, violation))
     order = np.argsort(every.violation, kind="stable")
     kept = [order[0]] if len(order) else []

@@ -135,7 +135,7 @@ def check_directions(name: str, m: int, population: int | None, divisions: int |
 
 
 def pair_up(costs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns, (min(r, c),) each, of pairs in `costs` (r, c): always the cheapest of the pairs that are left."""
+    """Rows and columns, (min(r, c),) each, of pairs in `costs` (r, c): greedily the cheapest remaining pair."""
     costs = costs.astype(float, copy=True)
     rows, columns = [], []
     for _ in range(min(costs.shape)):

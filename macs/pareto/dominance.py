@@ -1,4 +1,5 @@
-"""Pareto dominance of minimised objectives, their ranges, and comparisons up to rounding in units of these: pure functions of arrays."""
+"""Pareto dominance of minimised objectives, their ranges, and comparisons up to rounding in units of the ranges: pure functions of
+arrays."""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ def nondominated(F: np.ndarray) -> np.ndarray:
 
 
 def among(F: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Mask (n,) of the rows of F (n, m) that are rows of `known` (k, m)."""
+    """Mask (n,) of the rows of F (n, m) that occur in `known` (k, m)."""
     return (F[:, None] == known).all(axis=2).any(axis=1)
 
 
@@ -35,8 +36,8 @@ def dominates(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 
 
 def alpha_nondominated(F: np.ndarray) -> np.ndarray:
-    """Mask (n,) of the non-dominated rows of F (n, m) that are not far worse than another for a little of one objective, and of the best of
-    each objective.
+    """Mask (n,) of the alpha-non-dominated rows of F (n, m), not far worse than another for a small gain in one objective, and of each
+    objective's best.
 
     Each objective is charged a hundredth of the others, in ranges; points that are then dominated are left out (Ikeda, Kita and
     Kobayashi 2001). With more than two objectives such points are often far from the front, and others rarely dominate them.
@@ -77,7 +78,7 @@ CONSTANT = 1e-6
 
 
 def feasible_and_no_worse(found: Evaluation, F: np.ndarray, violation: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Mask (k,) of the results that are feasible optima and in no objective worse than points with F (k, m) and violation (k,)."""
+    """Mask (k,) of the results that are feasible optima and no worse in any objective than points with F (k, m) and violation (k,)."""
     with np.errstate(invalid="ignore"):
         return (found.status == CONVERGED) & (F + slack(violation)[:, None] * ranges >= found.F).all(axis=1)
 
@@ -99,8 +100,8 @@ def stated_scales(goals: Sequence[Objective]) -> np.ndarray:
 
 
 def objective_units(F: np.ndarray, stated: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """What counts as one in each objective (m,): the scale that was stated, 0 for none; else its range over points F (k, m), or its size if
-    it hardly varies, and at least `least` (m,); 1 where all that is 0."""
+    """The unit of each objective (m,): the stated scale, 0 for none; else its range over points F (k, m), or its size if it hardly varies,
+    and at least `least` (m,); 1 where all of these are 0."""
     span, size = np.ptp(F, axis=0), np.abs(F).max(axis=0)
     found = np.maximum(np.where(span > CONSTANT * size, span, size), least)
     return np.where(stated > 0.0, stated, np.where(found > 0.0, found, 1.0))

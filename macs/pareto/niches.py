@@ -1,7 +1,7 @@
 """Niches of a front of many objectives: the best point near each of evenly spread reference directions.
 
-With many objectives nearly all points are mutually non-dominated, and the farther a point is from the front, the more room it has around
-it: points that are only spread out move away from the front. So points compete along directions instead (Zhang and Li 2007; Deb and Jain
+With many objectives nearly all points are mutually non-dominated, and a point has the more room around it, the farther it is from the
+front: if only spacing counts, points move away from the front. So points compete along directions instead (Zhang and Li 2007; Deb and Jain
 2014; Yuan, Xu, Wang and Yao 2016).
 """
 

@@ -1,8 +1,8 @@
-"""Points of a front that are evenly spread: by their energy, as they repel each other like charges (Ricciardi and Vasile 2015).
+"""Evenly spread points of a front, by their energy: points repel each other like charges (Ricciardi and Vasile 2015).
 
-Points that are only spread evenly may stay behind the front: what lies a little behind it, between its neighbours, is not dominated by
-them, and has more room than on it. Such a point adds little to the volume that all dominate together (Beume, Naujoks and Emmerich 2007).
-The volume alone would draw points to where the front bulges, so a point also counts by the room it has.
+Energy alone may leave points behind the front: a point slightly behind it, between its neighbours, is not dominated by them, and has more
+room than on the front. Such a point has a small hypervolume contribution (Beume, Naujoks and Emmerich 2007). The hypervolume alone would
+draw points to where the front bulges, so the room of a point counts, too.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from .dominance import extremes
 
 
 class Guide(Protocol):
-    """How densely points are wanted along a front. Objectives are minimised; only points of the front at hand are known."""
+    """The wanted density of points along a front. Objectives are minimised; only points of the present front are known."""
 
     def factors(self, front: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Positive factors (k,) of distances at points (k, m) on a front (n, m): distances that are multiplied by them are to be even."""
+        """Positive factors (k,) of distances at points (k, m) on a front (n, m): distances times factors should be equal."""
 
     def anchors(self, front: np.ndarray) -> np.ndarray:
-        """Rows of the front (n, m) that are to be kept beside the best of each objective, most important first."""
+        """Rows of the front (n, m) to keep beside the best of each objective, most important first."""
 
 
 def reach(F: np.ndarray, exponent: float | None) -> float:
@@ -60,7 +60,7 @@ def pair_energies(F: np.ndarray, exponent: float | None = None, count: int | Non
 def spread(
     F: np.ndarray, limit: int, members: np.ndarray | None = None, exponent: float | None = None, guide: Guide | None = None
 ) -> np.ndarray:
-    """Mask (n,) of `limit` of the points F (n, m), n > limit, with a low energy of all pairs; the best of each objective is always kept.
+    """Mask (n,) of `limit` of the points F (n, m), n > limit, with a low energy of all pairs; the best of each objective always stays.
 
     Free places are filled one at a time by the point that adds least energy. Then chosen points are exchanged for others, the best exchange
     first, as long as an exchange lowers the energy. So the energy is at most that of `members`, if these are `limit` points that include
@@ -104,7 +104,7 @@ def _flip(inside: np.ndarray, energy: np.ndarray, energies: np.ndarray, point: n
 
 
 def _exchange(inside: np.ndarray, fixed: np.ndarray, energy: np.ndarray, energies: np.ndarray) -> None:
-    """Exchange points, in place, while that lowers the total energy; because of the threshold, rounding cannot exchange two for ever."""
+    """Exchange points, in place, while that lowers the total energy; a threshold prevents endless exchanges by rounding."""
     for _ in range(10 * len(inside)):
         out, others = np.flatnonzero(inside & ~fixed), np.flatnonzero(~inside)
         if not (out.size and others.size):
@@ -127,8 +127,8 @@ def dominated_volume(N: np.ndarray) -> float:
 
 
 def swap_by_hypervolume(F: np.ndarray, chosen: np.ndarray, fixed: np.ndarray, energies: np.ndarray, exponent: float) -> np.ndarray:
-    """Mask (n,) of as many of the points F (n, m) as are `chosen`: each of the others, in their order, has taken the place of the nearest
-    chosen one if it is worth more there.
+    """Mask (n,) of as many of the points F (n, m) as are `chosen`: each of the others, in their order, replaces the nearest chosen one if
+    its worth there is larger.
 
     Worth is the volume that a point adds times its room: the distance of a single neighbour with the energy of all. chosen, fixed (n,),
     energies (n, n).

@@ -1,1 +1,1 @@
-"""Solvers of problems: their contract, their run from a seed to a front, and its checkpoints."""
+"""Solvers of problems: their contract, the run from a seed to a front, and its checkpoints."""

@@ -1,8 +1,8 @@
-"""Keeps a run in a file, so that the same call continues it, whatever ended it.
+"""Checkpoints: a run is saved in a file, so that the same call continues it after any end.
 
-The first line of a file is `MACS checkpoint 7: N bytes, sha256 H`; N and H are those of the MessagePack document that follows. So a file
-that was damaged is refused before any of it is read. Of a forged one, no array takes more memory than the file has bytes. Nothing is
-pickled. The document says which run it is, by which versions it was computed, and how it stands; see `packing`.
+The first line of a file is `MACS checkpoint 7: N bytes, sha256 H`; N and H are those of the MessagePack document that follows. So a damaged
+file is refused before any of it is read. In a forged file, no array takes more memory than the file has bytes. Nothing is pickled. The
+document has the identity of the run, the versions that computed it, and its state; see `packing`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class RunStatus:
-    """How a run stands between two iterations, beside the state of its solver."""
+    """Status of a run between two iterations, beside the state of its solver."""
 
     seed: int
     counts: Counts
@@ -62,7 +62,7 @@ class RunStatus:
 
 @dataclass(frozen=True)
 class _Document:
-    """What a file has after its first line."""
+    """The document of a file, after its first line."""
 
     belongs: str  # JSON: all that determines the run, with its seed
     versions: list[dict[str, str]]
@@ -78,7 +78,7 @@ class Unreadable(ValueError):  # noqa: N818 - the state of the file
 
 
 class Checkpoint(AbstractContextManager["Checkpoint"]):
-    """A file that one run is kept in.
+    """The checkpoint file of one run.
 
     On leaving the context, what is not in the file yet is written. A write that fails does not stop the run: it is logged and tried again
     later, and `failure` gives the reason.
@@ -102,7 +102,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         return len(self._versions) > 1
 
     def read(self, seed: int | None) -> tuple[Any, RunStatus] | None:
-        """The solver's state, and how the run of this seed (None: of any seed) stands; None if there is no file."""
+        """The state of the solver and the status of the run with this seed (None: any seed); None if there is no file."""
         try:
             return self._read(seed)
         except FileNotFoundError:
@@ -136,7 +136,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         return state, status
 
     def keep(self, state: Any, status: RunStatus) -> None:
-        """Note how the run stands, for the next write. Raises TypeError for a state that is not as the contract of a solver has it."""
+        """Note the status of the run, for the next write. Raises TypeError for a state that breaks the contract of a solver."""
         content = encode(state)
         if not self._checked:
             check_kept(state, content, self._state_class)
@@ -156,7 +156,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         check_shapes(state, sizes)
 
     def write_in_time(self) -> None:
-        """Write what is not in the file yet, if the last write is long enough ago."""
+        """Write the latest status, unless it is in the file or the last write is too recent."""
         if time.perf_counter() - self._written > max(WRITE_SECONDS, WRITE_SHARE * self._took):
             self.write()
 
@@ -164,7 +164,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         self.write()
 
     def write(self) -> None:
-        """Write what is not in the file yet."""
+        """Write the latest status, unless it is in the file."""
         if self._waiting is None:
             return
         began = time.perf_counter()
@@ -181,7 +181,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 
 
 def keeps(solver: SearchMethod) -> bool:
-    """Whether a checkpoint can keep a run of this solver: whether the class of its state is known."""
+    """Whether a checkpoint can save a run of this solver: whether the class of its state is known."""
     try:
         _state_class(solver)
     except ValueError:
@@ -210,7 +210,7 @@ def _check_counts(status: RunStatus) -> None:
 
 
 def _read_json(text: str) -> Any:
-    """Data that can be compared: each NaN is the same word."""
+    """JSON data that can be compared: each NaN is the same word."""
     return json.loads(text, parse_constant=str)
 
 

@@ -46,7 +46,7 @@ class SearchMethod(ABC):
 
     @abstractmethod
     def begin(self, evaluator: Evaluator, budget: Any, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
-        """The state after a first population has been evaluated, the full vectors `start` (k, D) first; `budget` is the number of
+        """The state after the evaluation of a first population, the full vectors `start` (k, D) first; `budget` is the number of
         evaluations, None for a search until it is done."""
 
     @abstractmethod
@@ -67,12 +67,12 @@ class SearchMethod(ABC):
         raise NotImplementedError(f"{type(self).__name__} needs a number of evaluations")
 
     def ended(self, state: Any) -> str:
-        """Why a search is at its end, by the state alone, a word of `run.ENDED`; empty as long as it goes on."""
+        """Why a search is at its end, by the state alone, a word of `run.ENDED`; empty as long as it continues."""
         return ""
 
     def conclude(self, state: Any, evaluator: Evaluator) -> None:  # noqa: B027
-        """Do what follows the last evaluation of a search that was not stopped, or of one of its rounds, such as a polish; most solvers do
-        nothing.
+        """Do the final work, such as a polish, after the last evaluation of a search that was not stopped, or of one of its rounds; most
+        solvers do nothing.
 
         If asked to end early (`transcription.stopping`), the state keeps the results so far. A checkpoint may keep the state before each
         batch of this work: called with that state, it continues to the same bits.
@@ -84,7 +84,7 @@ class SearchMethod(ABC):
 
     @property
     def makes_state(self) -> Callable[..., Any]:
-        """The method whose return annotation is the class of the state, which checkpoints need."""
+        """The method whose return annotation is the class of the state, for checkpoints."""
         return self.begin
 
     @property
@@ -106,7 +106,7 @@ class SearchMethod(ABC):
 
     @property
     def remeshes(self) -> bool:
-        """Whether `finish` solves points on finer meshes, so that a search may go on a coarse one."""
+        """Whether `finish` solves points on finer meshes, so that a search may use a coarse one."""
         return False
 
     def finish(self, front: Front, verify: float | None, progress: bool | None, chosen: SearchMeshes | None = None) -> Front:

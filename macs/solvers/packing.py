@@ -1,12 +1,12 @@
-"""The state of a solver as bytes, and the state rebuilt from them by the annotations of its dataclasses.
+"""Serialisation of a solver's state to bytes and back, by the annotations of its dataclasses.
 
-The bytes are MessagePack. Arrays are their type, shape and content, generators the state of their bits and seeds. What does not fit the
-annotations is an error that names the field. Nothing is pickled.
+The bytes are MessagePack. Arrays are stored as type, shape and content, generators as the state of their bits and seeds. Data that do not
+fit the annotations raise an error that names the field. Nothing is pickled.
 
-Whether arrays have the shapes that a state needs, its dataclasses state in `SHAPES`: array -> its dimensions, after which its kind may
-follow, "int", "bool" or "str"; floats by default. A dimension is "m", "d" or "D" (objectives, free variables, entries of a full vector: the
-same everywhere in a state), twice one of them ("2m"), a number, the name of a field that is a dataclass (its length), or any other word,
-which is one number in the dataclass. `INDICES` says which whole numbers are rows of which array; -1 is none.
+Dataclasses of a state give the shapes of its arrays in `SHAPES`: array -> its dimensions, after which its kind may follow, "int", "bool" or
+"str"; floats by default. A dimension is "m", "d" or "D" (objectives, free variables, entries of a full vector: the same everywhere in a
+state), twice one of them ("2m"), a number, the name of a field that is a dataclass (its length), or any other word, which is one number in
+the dataclass. `INDICES` says which integers are rows of which array; -1 is none.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SHAPE_KINDS = {"int": "i", "bool": "b", "str": "U"}
 
 
 def encode(value: Any) -> bytes:
-    """The bytes of a value: numbers are exact, and arrays keep the order of their axes in memory, on which sums depend."""
+    """The bytes of a value: numbers are exact, and arrays keep their memory order, on which the rounding of sums depends."""
     return msgspec.msgpack.encode(value, enc_hook=_plain)
 
 
@@ -47,13 +47,13 @@ def decode(content: bytes, kind: Any) -> Any:
 
 
 def check_kept(state: Any, content: bytes, kind: type) -> None:
-    """Raise TypeError unless the bytes of a state make the same state again: its fields are annotated with what they are."""
+    """Raise TypeError unless the bytes of a state give the same state again: its annotations must be right."""
     if type(state) is not kind or encode(decode(content, kind)) != content:
         raise TypeError(f"the annotations of {kind.__name__} do not say all that its fields are")
 
 
 def _plain(value: Any) -> Any:
-    """What MessagePack knows for what it does not."""
+    """A value that MessagePack does not know, in types that it knows."""
     if type(value) is np.ndarray and value.dtype.kind in ARRAY_KINDS:
         order: Literal["F", "C"] = "F" if not value.flags.c_contiguous and value.strides == tuple(sorted(value.strides)) else "C"
         return {"dtype": value.dtype.str, "shape": value.shape, "order": order, "content": value.tobytes(order)}
@@ -83,7 +83,7 @@ def _rebuilt(kind: Any, value: Any) -> Any:
 
 
 def _array(value: Any) -> np.ndarray:
-    """An array of bytes that are there already: nothing is allocated by what a file says of its shape."""
+    """An array on existing bytes: the shape stated in a file allocates no memory."""
     try:
         dtype, shape, order, content = np.dtype(value["dtype"]), tuple(value["shape"]), value["order"], value["content"]
         if dtype.kind not in ARRAY_KINDS or not dtype.itemsize or math.prod(shape) * dtype.itemsize != len(content):
@@ -120,8 +120,8 @@ def _like(value: Any, pattern: Any, name: str = "state") -> Any:
 
 
 def check_shapes(state: Any, sizes: dict[str, int], where: str = "state", shapes: Mapping[str, str] | None = None) -> None:
-    """Raise TypeError that names the array unless all arrays of a state are as its dataclasses say, or `shapes`. `sizes` are those known
-    of `COMMON_SIZES`."""
+    """Raise TypeError that names the array unless all arrays of a state fit `SHAPES`, or `shapes`. `sizes` are the known ones of
+    `COMMON_SIZES`."""
     own: dict[str, int] = {}
     for name, words in (getattr(state, "SHAPES", {}) if shapes is None else shapes).items():
         if (array := getattr(state, name)) is not None:

@@ -79,7 +79,7 @@ class SearchDisplay(Display):
 
     @property
     def elapsed(self) -> float:
-        """Seconds that the search has taken, those in earlier processes included."""
+        """Seconds of the search, including earlier processes."""
         return self._last.elapsed if self._last else 0.0
 
     def update(self, progress: Progress) -> None:

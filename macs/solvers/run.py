@@ -142,7 +142,7 @@ class SearchRun:
             raise Stopped("callback")
 
     def _keep(self, stopped: str = "") -> None:
-        """Give the state to the checkpoint, unless work of the last iteration was cut short: this iteration is done again."""
+        """Give the state to the checkpoint, unless the last iteration was cut short: a continued run repeats this iteration."""
         if self._cut_short():
             return
         counts = self.evaluator.counts
@@ -157,7 +157,7 @@ class SearchRun:
 
     @property
     def _reason(self) -> str:
-        """Why the work is asked to end; empty as long as it is not."""
+        """Why the work has to end; empty as long as it may continue."""
         return self._interrupts.reason or self._called_off
 
     def _keep_and_write(self) -> None:
@@ -165,7 +165,7 @@ class SearchRun:
         self._write_in_time()
 
     def _keep_and_ask(self) -> None:
-        """As `_keep_and_write`, between the solves of a polish after which a search may go on: the callback may end it there, too."""
+        """As `_keep_and_write`, between the solves of a polish after which a search may continue: the callback may end it there, too."""
         self._keep_and_write()
         try:
             self._call_back(self._show())

@@ -1,4 +1,4 @@
-"""Solvers: search methods that a user calls for the Pareto front of a problem or of a plain function, and solvers by name."""
+"""Solvers: search methods with calls for the Pareto front of a problem or of a plain function, and solvers by name."""
 
 from __future__ import annotations
 
@@ -366,7 +366,7 @@ class Solver(SearchMethod):
 
 
 def _not_simulated(front: Front, error: Exception) -> Front:
-    """The front as the search left it. A search may have taken hours: its front is not lost by what follows it, and says what failed."""
+    """The front as the search left it, with a message on the failure: an error after a search of hours must not lose its front."""
     log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
     failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
     return front.replace(message="; ".join(filter(None, [front.message, failed])))
@@ -403,7 +403,8 @@ def solver_class(name: str) -> type[Solver]:
 
 
 def solver(name: str, **settings: Any) -> Solver:
-    """A solver by name, with its settings; with `paper=True` those of its paper, where it has them (`MACS.paper`), but for those given."""
+    """A solver by name, with its settings; `paper=True` takes those of its paper, where it has them (`MACS.paper`), except the given
+    ones."""
     kind = solver_class(name)
     known = inspect.signature(kind).parameters
     paper = settings.pop(PAPER, False)

@@ -1,4 +1,4 @@
-"""Checks of a solver's arguments, and the vectors that a search begins with."""
+"""Checks of a solver's arguments, and the first vectors of a search."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def drawing(start: Any) -> Smooth | str | None:
 
 
 def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
-    """Full vectors (k, D) that a search begins with: with `guess` the problem's guess, then the vectors of `start`; None if there are none.
+    """First full vectors (k, D) of a search: with `guess` the problem's guess, then the vectors of `start`; None if there are none.
 
     `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points on other meshes are
     interpolated; those of the problem with other data, such as other bounds, are moved into the bounds.
@@ -75,7 +75,7 @@ def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
 
 
 def decisions(start: Any, variables: Sequence[Variable]) -> np.ndarray:
-    """Decisions (k, D) that a search begins with, within their bounds. Points may be those of other bounds, and are moved into these.
+    """First decisions (k, D) of a search, within their bounds. Points may come from other bounds, and are moved into these.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def _on_mesh(point: Point, nlp: NLP) -> np.ndarray:
 
 
 def check_start(start: Any, problem: CompiledProblem) -> None:
-    """Raise ValueError for an unknown word, and for points that are not of this problem, whatever its data are; no mesh is needed."""
+    """Raise ValueError for an unknown word, and for points of another problem (other data are allowed); no mesh is needed."""
     drawing(start)
     for point in _points(start):
         if point.trajectory is not None and _named(point.trajectory) != _named(problem):
