@@ -194,8 +194,7 @@ class GradientSolves:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A vector z (n,) at which a solve begins, whether the solve stays near it, and by how much its result may be worse than the known
-    one."""
+    """A vector z (n,) at which a solve begins, whether the solve stays near it, and the loss that its result may have."""
 
     z: np.ndarray
     near: bool = False

@@ -1,5 +1,4 @@
-"""Pareto dominance of minimised objectives, their ranges, and comparisons up to rounding in units of the ranges: pure functions of
-arrays."""
+"""Pareto dominance of minimised objectives, their ranges, and comparisons up to rounding in these units: pure functions of arrays."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
 The agents are few, and each searches near its own position. The archive covers the whole front, and the differences of its points lead
 along the front: crossover exchanges coordinates between two points, and the difference of two points is a step for a third. Crossover suits
-separable problems with many local fronts, differences suit coupled variables. The operator with more offspring in the archive is used more
-often.
+separable problems with many local fronts, differences suit coupled variables. The operator with more archived offspring is preferred.
 
 As long as nothing is feasible the archive is empty, and the least violated points are bred likewise: they are ordered by one number, and a
 generation of children with coordinates of both parents lowers it sooner than steps of single agents. Tournaments of two then choose the

@@ -91,13 +91,21 @@ class Opening:
 
     def _solver(self) -> MultistartSolver | None:
         """Solver that begins at the best given vector; without any, at the problem's guess, as gradient tools do; without a guess, at the
-        least violated candidate. None if none is finite.""" assert isinstance(self._evaluator, Bilevel) seen, given = self.population,
-        slice(self._given) known = np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1) violation = np.where(known,
-        seen.violation, np.inf) start = guessed_start(self._evaluator.nlp) if known[given].any(): start =
-        self._Z[[np.argmin(violation[given])]]  # as it was given: propagated states may be far from those elif start is None and
-        known.any(): start = seen.Z[[np.argmin(violation)]] if start is None: return None count = None if self._evaluator.ways else 1
-        solves, most = _counted_by(self._evaluator), self._budget // GRADIENT_RULES.evaluations_per_start return
-        MultistartSolver(self._evaluator.nlp, start, count, self._rng, solves, GRADIENT_RULES.unseen, most)
+        least violated candidate. None if none is finite."""
+        assert isinstance(self._evaluator, Bilevel)
+        seen, given = self.population, slice(self._given)
+        known = np.isfinite(seen.F).all(axis=1) & np.isfinite(seen.Z).all(axis=1)
+        violation = np.where(known, seen.violation, np.inf)
+        start = guessed_start(self._evaluator.nlp)
+        if known[given].any():
+            start = self._Z[[np.argmin(violation[given])]]  # as it was given: propagated states may be far from those
+        elif start is None and known.any():
+            start = seen.Z[[np.argmin(violation)]]
+        if start is None:
+            return None
+        count = None if self._evaluator.ways else 1
+        solves, most = _counted_by(self._evaluator), self._budget // GRADIENT_RULES.evaluations_per_start
+        return MultistartSolver(self._evaluator.nlp, start, count, self._rng, solves, GRADIENT_RULES.unseen, most)
 
     def _decided(self, solver: MultistartSolver | None) -> bool:
         """Whether a gradient solve for the first objective ends at an optimum, or solves for feasibility find that there is none."""

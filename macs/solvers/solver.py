@@ -366,7 +366,7 @@ class Solver(SearchMethod):
 
 
 def _not_simulated(front: Front, error: Exception) -> Front:
-    """The front as the search left it, with a message on the failure: an error after a search of hours must not lose its front."""
+    """The front as the search left it, with a message: an error after a long search must not lose its front."""
     log.warning("what follows the search failed; the front is as the search left it", exc_info=True)
     failed = f"not simulated, since this failed ({type(error).__name__}: {' '.join(str(error).split())})"
     return front.replace(message="; ".join(filter(None, [front.message, failed])))
@@ -403,8 +403,7 @@ def solver_class(name: str) -> type[Solver]:
 
 
 def solver(name: str, **settings: Any) -> Solver:
-    """A solver by name, with its settings; `paper=True` takes those of its paper, where it has them (`MACS.paper`), except the given
-    ones."""
+    """A solver by name, with its settings; `paper=True` takes those of its paper (`MACS.paper`), if there are any, except given ones."""
     kind = solver_class(name)
     known = inspect.signature(kind).parameters
     paper = settings.pop(PAPER, False)
