@@ -1,1 +1,1 @@
-"""Mesh refinement: errors of a mesh, and the next finer one."""
+"""Mesh refinement: errors of a mesh, and the next finer mesh."""

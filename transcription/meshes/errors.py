@@ -1,7 +1,7 @@
-"""Errors of a trajectory element by element, independent of the transcription, in units of what states and controls do on it.
+"""Errors of a trajectory element by element, independent of the transcription, in units of the ranges of its states and controls.
 
-The bounds of a variable may be any number of times as wide as what it does between them. An error that is small against the bounds may be
-all of the solution.
+The bounds of a variable may be many times as wide as its range along the trajectory. An error that is small against the bounds may be as
+large as the solution.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ FLAT_ON_ELEMENT = 1e-4
 
 
 def own_scales(low: np.ndarray, high: np.ndarray, span: np.ndarray) -> np.ndarray:
-    """What counts as one in quantities (k,) between the values `low` and `high` of a trajectory, with bounds of these spans: their ranges
-    there, at least a thousandth of their size and a millionth of the span for those that are constant, and never more than the span."""
+    """Units of quantities (k,) between the values `low` and `high` of a trajectory, with bounds of these spans: their ranges there, at
+    least a thousandth of their size and a millionth of the span (for constant ones), and never more than the span."""
     size = np.maximum(np.abs(low), np.abs(high))
     return np.minimum(span, np.max([high - low, 1e-3 * size, 1e-6 * span], axis=0))
 
@@ -37,19 +37,19 @@ def _of(piece: PiecewisePolynomial, variables: Sequence[Variable]) -> np.ndarray
 
 
 def state_scales(trajectory: PhaseTrajectory) -> np.ndarray:
-    """What counts as one in each state (nx,) of a phase."""
+    """The unit of each state (nx,) of a phase."""
     return _of(trajectory.state, trajectory.state_variables)
 
 
 def control_scales(trajectory: PhaseTrajectory) -> np.ndarray:
-    """What counts as one in each control (nu,) of a phase."""
+    """The unit of each control (nu,) of a phase."""
     return _of(trajectory.control, trajectory.control_variables)
 
 
 def objective_variations(nlp: NLP, z: np.ndarray) -> np.ndarray:
-    """How much the objectives (m,) change if the entries of a vector (n,) are changed by random parts of what they do: the median of 31.
+    """Changes of the objectives (m,) for random changes of a vector (n,) by parts of the ranges of its entries: the median of 31.
 
-    It is a size of objectives that does not vanish where they do, and does not depend on the width of bounds.
+    This size of the objectives does not vanish where they vanish, and does not depend on the width of bounds.
     """
     ranges = np.minimum(nlp.span, _ranges(nlp, z))
     rng = np.random.default_rng(0)
@@ -60,7 +60,7 @@ def objective_variations(nlp: NLP, z: np.ndarray) -> np.ndarray:
 
 
 def _ranges(nlp: NLP, z: np.ndarray) -> np.ndarray:
-    """The ranges (n,) of what the entries of a vector belong to: all with the same name but for what stands in brackets."""
+    """The ranges (n,) of the quantities of the entries of a vector: entries of one quantity have the same name up to brackets."""
     names = np.array([re.split(r"[\[(]", v.name)[0] for v in nlp.variables])
     _, member = np.unique(names, return_inverse=True)
     low, high = np.full(member.max() + 1, np.inf), np.full(member.max() + 1, -np.inf)
@@ -72,7 +72,7 @@ def _ranges(nlp: NLP, z: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class PhaseErrors:
-    """Of one phase of N elements. Scales are those of `state_scales` and `control_scales`."""
+    """Errors of one phase of N elements. Scales are those of `state_scales` and `control_scales`."""
 
     # (N,): Largest difference between the state at the end of an element and the state that an integrator reaches from its beginning with
     # its controls, in scales; infinite where the integration breaks down.

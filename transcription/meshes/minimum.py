@@ -1,9 +1,9 @@
-"""By how much controls miss Pontryagin's minimum principle, and where: what the control itself could still gain, whatever its mesh.
+"""The violation of Pontryagin's minimum principle along a trajectory: the gain that other controls would bring, on any mesh.
 
-At an optimum the Hamiltonian H = costates' rates + weighted integrands is at its least for the controls at every time. Where other values
-of the controls make it less by d, having them for a time dt instead makes the weighted objectives less by d dt (Pontryagin et al., "The
-Mathematical Theory of Optimal Processes", 1962, chapter II). A mesh whose elements are too long to let a control leave its bound for a
-moment is a local optimum of its own, and its own multipliers tell.
+At an optimum, the controls minimise the Hamiltonian H = costates' rates + weighted integrands at every time. Where other values of the
+controls lower it by d, using them for a time dt lowers the weighted objectives by d dt (Pontryagin et al., "The Mathematical Theory of
+Optimal Processes", 1962, chapter II). If elements are too long for a control to leave its bound for a moment, the solution is a local
+optimum of its mesh only, and its own multipliers show that.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class OptimumMultipliers:
 
 @dataclass(frozen=True, eq=False)
 class Gain:
-    """What controls of a phase could gain."""
+    """The gain of other controls in a phase."""
 
     # (N,): The integral, over each element, of how much less the Hamiltonian could be: what the weighted objectives could gain there, to
     # first order, in units.
@@ -57,7 +57,7 @@ class Gain:
 def gains(
     problem: CompiledProblem, trajectory: Trajectory, optimum: OptimumMultipliers, quantities: Sequence[np.ndarray], units: np.ndarray
 ) -> dict[str, Gain]:
-    """What the controls of each phase with costates could gain. units (m,)."""
+    """The gain of other controls in each phase with costates. units (m,)."""
     # The sum of the objectives in which a gain is one unit of each.
     total = float(optimum.of_objectives @ units)
     if not total > 0:
@@ -76,7 +76,7 @@ def gains(
 def _gain(
     phase: CompiledPhase, trajectory: PhaseTrajectory, costates: PiecewisePolynomial, weights: np.ndarray, parameters: np.ndarray
 ) -> Gain:
-    """What the controls of one phase could gain, from its costates and the weights of its integrands."""
+    """The gain of other controls in one phase, from its costates and the weights of its integrands."""
     shape = len(trajectory.state.edges) - 1, len(TAU)
     x, u, t, s = trajectory.sampled(TAU, parameters)
     adjoint = costates.on_elements(TAU).reshape(len(t), -1)
@@ -102,7 +102,7 @@ def _gain(
 
 
 def _others(phase: CompiledPhase, u: np.ndarray) -> list[np.ndarray]:
-    """Other controls (k, nu) to compare: one changed at a time, on a grid and near its own value; and all of a few on their bounds."""
+    """Other controls (k, nu) for comparison: one changed at a time, on a grid and near its value; and all corners of a few controls."""
     lower, upper = (np.array([getattr(v, side) for v in phase.controls]) for side in ("lower", "upper"))
     found = []
     for i in range(len(lower)):

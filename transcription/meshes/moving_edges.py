@@ -1,8 +1,8 @@
-"""Meshes whose edges lie at the switches of the controls, and at the ends of contacts with limits, and move with them.
+"""Meshes with moving edges at the switches of controls and at the ends of contacts with limits.
 
-On a coarse mesh a switch is smeared over the element in which it lies: the control leaves its bound somewhere before and reaches the other
-somewhere behind. What survives is its integral, since the states depend on it. A switch is therefore put where a control that jumps has
-the same integral over the smeared stretch, and so is a short pulse, which a coarse mesh shows as a hump.
+On a coarse mesh a switch is smeared over its element: the control leaves its bound before it and reaches the other bound behind it. Its
+integral stays right, since the states depend on it. A switch is therefore placed so that a jumping control has the same integral over the
+stretch. The same rule places a short pulse, which a coarse mesh shows as a hump.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ LOWER, INSIDE, UPPER = BoundSide
 
 @dataclass(frozen=True)
 class SwitchNumbers:
-    """What counts as a switch, and when switches share an edge: lengths in elements, distances in spans, unless stated."""
+    """Tolerances of a switch, and of switches that share an edge: lengths in elements, distances in spans, unless stated."""
 
     on_bound: float = 1e-2  # a value nearer to a bound is on it
     smeared: float = 1.25  # a switch may be smeared over so many elements
@@ -145,7 +145,7 @@ def contacts(places: np.ndarray, values: np.ndarray, lower: float, upper: float)
 
 
 def _reached(t: np.ndarray, distance: np.ndarray) -> float:
-    """Where a limit is reached, seen from there: the distance grows as some power of the time from it, which three levels tell."""
+    """The time of reaching a limit, extrapolated: the distance grows as a power of the time from it, which three levels determine."""
     levels = (1.0, 4.0, 16.0)
     beyond = [np.flatnonzero(distance >= level) for level in levels]
     if not all(len(one) for one in beyond):
@@ -184,7 +184,7 @@ def _passages(part: Stretch, t: np.ndarray, u: np.ndarray, before: int | None, a
 
 
 def _jumps(places: np.ndarray, values: np.ndarray, part: Stretch) -> list[Switch]:
-    """Jumps inside the bounds at edges, thrice the changes beside them: controls that oscillate where they hardly matter jump, too."""
+    """Jumps inside the bounds at edges, three times the changes beside them: controls that oscillate where they hardly matter jump, too."""
     change = np.abs(values[1:, 0] - values[:-1, -1])
     own = np.ptp(values, axis=1)
     size = values.shape[1]
@@ -201,13 +201,13 @@ def labels(u: np.ndarray) -> np.ndarray:
 
 
 def _elements(places: np.ndarray, part: Stretch) -> float:
-    """How many elements a stretch covers, in parts of each."""
+    """The number of elements that a stretch covers, with fractions."""
     starts, ends = places[:, 0], places[:, -1]
     return float((np.clip(np.minimum(part.end, ends) - np.maximum(part.start, starts), 0.0, None) / (ends - starts)).sum())
 
 
 def _without(parts: Sequence[Stretch], places: np.ndarray, labels: Sequence[int], around: int, least: float) -> list[Stretch]:
-    """The stretches; those with one of `labels`, shorter than `least` elements and between two labelled `around`, are part of these."""
+    """The stretches; those with one of `labels`, shorter than `least` elements and between two labelled `around`, join these."""
     kept: list[Stretch] = []
     for i, part in enumerate(parts):
         between = 0 < i < len(parts) - 1 and parts[i - 1].label == parts[i + 1].label == around
@@ -250,8 +250,8 @@ def next_mesh(method: Meshed, statement: CompiledPhase, phase: PhaseTrajectory, 
 
 
 def at_switches(method: Method, trajectory: Trajectory) -> Method | None:
-    """The same method on the meshes of a trajectory that it made, with all moving edges at switches of controls, where a finer mesh is to
-    begin: its edges may have left them.
+    """The same method on the meshes of its trajectory, with all moving edges put back at switches of controls, as the start of a finer
+    mesh: the edges may have left them.
 
     Where an edge may move, an objective has many local optima that differ by less than what counts, since one element of high degree
     describes the end of an arc nearly as well as two do. In these, the costates are known less well.
@@ -298,7 +298,7 @@ def phase_switches(phase: PhaseTrajectory) -> dict[str, list[Switch]]:
 
 
 def phase_contacts(statement: CompiledPhase, phase: PhaseTrajectory, parameters: np.ndarray) -> dict[str, list[Switch]]:
-    """Where each state and each path constraint of a phase reaches and leaves its limits."""
+    """The places where each state and each path constraint of a phase reaches and leaves its limits."""
     edges = phase.control.edges
     times = edges[:-1, None] + 0.5 * (1.0 + TAU) * np.diff(edges)[:, None]
     states, controls = phase.state(np.minimum(times, edges[1:, None])), phase.controls_on_elements(TAU)
@@ -311,7 +311,7 @@ def phase_contacts(statement: CompiledPhase, phase: PhaseTrajectory, parameters:
 
 
 def on_bounds(phase: PhaseTrajectory, found: Mapping[str, Sequence[Switch]], places: Sequence[float]) -> dict[str, list[int]]:
-    """On which of the arcs between `places` each control is on a bound, from its switches; a periodic one never is."""
+    """The arcs between `places` on which each control is on a bound, from its switches; a periodic control has none."""
     middles = 0.5 * (np.array([0.0, *places]) + np.array([*places, 1.0]))
     arcs: dict[str, list[int]] = {v.name: [] for v in phase.control_variables if v.period}
     for name, own in found.items():
@@ -343,14 +343,14 @@ class _SharedEdge:
 
     @property
     def real(self) -> bool:
-        """Whether a control is another one behind it."""
+        """Whether the label of a control changes here, or it is inside its bounds behind it."""
         return any(self.before[name] != self.after[name] or self.after[name] == INSIDE for name in self.after)
 
 
 def edge_places(
     found: Mapping[str, Sequence[Switch]], touching: Mapping[str, Sequence[Switch]], mesh: PhaseMesh, pressed: np.ndarray
 ) -> list[float]:
-    """Where edges are to move, increasing. pressed (m,)."""
+    """The places of moving edges, increasing. pressed (m,)."""
     edges = np.array(mesh.edges)
     known = edges[list(mesh.moving)]
     target = known.copy()
@@ -419,7 +419,7 @@ def _samples(phase: PhaseTrajectory) -> dict[str, tuple[np.ndarray, np.ndarray]]
 
 
 def _mostly(places: np.ndarray, values: np.ndarray) -> int:
-    """The bound on which a control is for nine tenths of the time; INSIDE if there is none."""
+    """The bound that a control has for nine tenths of the time; INSIDE if there is none."""
     parts = stretches(places, values)
     share = {side: sum(part.length for part in parts if part.label == side) for side in (LOWER, UPPER)}
     side = max(share, key=lambda one: share[one])

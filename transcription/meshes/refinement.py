@@ -5,8 +5,8 @@ and Xia, "An interactive fuzzy physical programming for solving multiobjective s
 53(5), 2017, section IV, eqs. (15)-(19). Eq. (18) is misprinted there: the curvature of a graph is |x''| / (1 + x'^2)^(3/2). The sum in eq.
 (19) is taken over the states.
 
-A density is linear on each of k cells of a phase and may jump between them: `places` (k + 1,) where cells begin and end, and `values`
-(k, 2) at both ends of each. Only its shape counts.
+A density is linear on each of k cells of a phase and may jump between them: `places` (k + 1,) are the ends of the cells, and `values` (k,
+2) its values at both ends of each. Only its shape counts.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ error is `graded`, since nothing tells how thin the layer is."""
 
 @dataclass(frozen=True)
 class RefinementNumbers:
-    """How elements are refined; errors in units of what they may be."""
+    """Rules of refinement; errors in units of the tolerance."""
 
     smooth: float = 0.8  # rate of decay of Legendre coefficients from which on a higher degree is worth more than shorter elements
     worst_share: float = 0.1  # elements whose error is at least this share of the largest are refined together
@@ -51,7 +51,7 @@ REFINEMENT = RefinementNumbers()
 
 
 def curvatures(places: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Curvatures (k + 1, nx) of the graphs of quantities over their places, mended eq. (18), by finite differences.
+    """Curvatures (k + 1, nx) of the graphs of quantities over their places, by the corrected eq. (18) and finite differences.
 
     Shooting knows the states best at the ends of its steps, and where controls jump at a node, states have a kink there, which no
     derivative inside a step sees but a second difference does. places (k + 1,), x (k + 1, nx).
@@ -70,12 +70,12 @@ def curvature_density(kappa: np.ndarray, c: float | np.ndarray = 1.0) -> np.ndar
 
 
 def lowered(places: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Quantities (k + 1, nx) in units in which no piece of a graph is steeper than 1: curvature falls with the third power of slope."""
+    """Quantities (k + 1, nx), scaled so that no slope of a graph is larger than 1: curvature falls with the third power of slope."""
     return x / np.maximum(np.abs(np.diff(x, axis=0) / np.diff(places)[:, None]).max(axis=0), 1.0)
 
 
 def trajectory_density(phase: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
-    """The density of a phase's trajectory over places relative to it, from its states: where controls jump, these have a kink."""
+    """The density of a phase's trajectory over relative places, from its states, which have a kink where controls jump."""
     edges = phase.state.edges
     places = (edges - edges[0]) / (edges[-1] - edges[0])
     if len(places) < 3:
@@ -86,7 +86,7 @@ def trajectory_density(phase: PhaseTrajectory) -> tuple[np.ndarray, np.ndarray]:
 
 
 def continuous(values: np.ndarray) -> np.ndarray:
-    """Values (k, 2) on the cells of a density that is given at their ends, (k + 1,)."""
+    """Values (k, 2) on the cells, of a density (k + 1,) at their ends."""
     return np.stack([values[:-1], values[1:]], axis=-1)
 
 
@@ -96,13 +96,13 @@ def integrals(places: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def normalised(places: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """The same density with a mean of 1: eq. (15), if the places go from 0 to 1. One that is zero everywhere becomes constant."""
+    """The same density with a mean of 1: eq. (15), if the places go from 0 to 1. A density that is zero everywhere becomes constant."""
     total = integrals(places, values)[-1]
     return values * ((places[-1] - places[0]) / total) if total > 0.0 else np.ones_like(values)
 
 
 def raised(places: np.ndarray, values: np.ndarray, least: float = DENSITY_FLOORS[0]) -> np.ndarray:
-    """The density with a mean of 1 and nowhere below `least` of that: so much of it everywhere, and the rest in the old shape."""
+    """The density with a mean of 1 and values of at least `least`: a constant part of `least`, and the rest in the old shape."""
     return least + (1.0 - least) * normalised(places, values)
 
 
@@ -123,7 +123,7 @@ def equidistributed(places: np.ndarray, values: np.ndarray, count: int) -> np.nd
 
 
 def next_method(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
-    """The method on finer meshes, its controls bounded where one leaves its bounds between nodes; the same where none can be finer."""
+    """The method on finer meshes, its controls bounded everywhere if one leaves its bounds between nodes; the same if none can be finer."""
     all_scores, bounded = verdict.scores(), verdict.leaving > verdict.wanted.leaving
     by_phase = dict(zip(trajectory, all_scores, strict=True))
     others, of_controls = {name: one.others for name, one in by_phase.items()}, {name: one.controls for name, one in by_phase.items()}
@@ -159,7 +159,7 @@ def redistributed(method: Method, problem: CompiledProblem, trajectory: Trajecto
 def next_intervals(
     old: PhaseMesh, phase: PhaseTrajectory, errors: np.ndarray, of_controls: np.ndarray, degree: int, least: float, most: int
 ) -> PhaseMesh:
-    """The next mesh of a phase, by its density: more intervals where errors (N,) ask for it, or where nothing is wrong."""
+    """The next mesh of a phase, by its density: more intervals if errors (N,) require them, or if no error does."""
     places, values = trajectory_density(phase)
     right = max(errors.max(initial=0.0), of_controls.max(initial=0.0)) <= 1.0
     count = min(max(most, old.elements), int(np.ceil(1.5 * old.elements))) if right else old.elements
@@ -175,7 +175,7 @@ def next_intervals(
 
 
 def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
-    """The method with elements cut where other controls would gain: where these jump, else in the middle; no edge moves."""
+    """The method with elements cut where other controls would gain: at the jumps of these, else in the middle; no edge moves."""
     finer = {}
     most = max((float(gain.amounts.max()) for gain in verdict.gains.values()), default=0.0)
     for name, gain in verdict.gains.items():
@@ -256,14 +256,14 @@ def pieces(error: float, power: int) -> int:
 
 
 def degrees(error: float, rate: float) -> float:
-    """The further degrees, at least one, that bring a smooth element's error down to 1: at its ends it falls by exp(-2 rate) with each."""
+    """The further degrees, at least one, that reduce a smooth element's error to 1: at its ends, each reduces the error by exp(-2 rate)."""
     if error <= 1.0 or rate == np.inf:
         return 1.0 if np.isfinite(error) else np.inf
     return max(1.0, float(np.ceil(np.log(error) / (2.0 * rate)))) if rate > 1e-3 else np.inf
 
 
 def cuts(steep: float, parts: int = 2, graded: bool = False) -> list[float]:
-    """Where, on (-1, 1), to cut an element: on both sides of the place where a control is steep, else into equal parts."""
+    """The places on (-1, 1) to cut an element: on both sides of the place where a control is steep, else into equal parts."""
     if np.isnan(steep):
         return np.linspace(-1.0, 1.0, parts + 1)[1:-1].tolist()
     distances = LAYERS if graded else LAYERS[:1]
@@ -274,7 +274,7 @@ def cuts(steep: float, parts: int = 2, graded: bool = False) -> list[float]:
 
 
 def split(edges: np.ndarray, cut: dict[int, list[float]], most: int) -> np.ndarray:
-    """Cut elements, in the order in which they are given, as long as there are at most `most` elements."""
+    """Cut elements, in the given order, as long as there are at most `most` elements."""
     added: list[float] = []
     for j, places in cut.items():
         room = most - (len(edges) - 1 + len(added))
@@ -285,8 +285,8 @@ def split(edges: np.ndarray, cut: dict[int, list[float]], most: int) -> np.ndarr
 
 
 def merged(edges: np.ndarray, order: int, error: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """The mask (N + 1,) of the edges that remain when neighbouring elements that are far better than they need to be become one, unless one
-    is four times as long as the other.
+    """The mask (N + 1,) of the edges that remain after merging neighbouring elements with errors far below the tolerance, unless one is
+    four times as long as the other.
 
     `kept` (N + 1,): edges that remain in any case. No element takes part twice.
     """

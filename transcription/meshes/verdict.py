@@ -1,4 +1,4 @@
-"""One trajectory on its mesh, held against simulations: how wrong it is, where, and whether that is good enough."""
+"""Assessment of one trajectory on its mesh by simulations: its errors, their places, and whether they are within tolerance."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .minimum import Gain, OptimumMultipliers, gains
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is good enough."""
+    """Tolerances of a trajectory."""
 
     tolerance: float  # largest defect: of the simulated states from those of the mesh, in units of what the states do
     feasible: float  # largest excess of constraints, simulated and between nodes, in their scales
@@ -61,12 +61,12 @@ class Verdict:
 
     @property
     def gain(self) -> float:
-        """What all controls together could still gain."""
+        """The gain of other controls in all phases together."""
         return sum(float(gain.amounts.sum()) for gain in self.gains.values())
 
     @property
     def doubt(self) -> float:
-        """How much too low, in their units, objectives may be since constraints are not satisfied exactly: three times the violation."""
+        """The possible underestimate of objectives, in their units, due to inexact constraints: three times the violation."""
         return 3.0 * self.simulation.violation / self.narrow
 
     @property
@@ -76,7 +76,7 @@ class Verdict:
 
     @property
     def excess(self) -> float:
-        """The largest amount by which states and path constraints leave their limits between nodes, in their scales."""
+        """The largest excess of states and path constraints over their limits between nodes, in their scales."""
         return max((float(phase.excess.max()) for phase in self.errors), default=0.0)
 
     @property
@@ -86,7 +86,7 @@ class Verdict:
 
     @property
     def unstable(self) -> bool:
-        """Whether no simulation of the whole can follow: the least error of an integrator, 1e-11, grown along it, is not tolerable."""
+        """Whether no simulation of the whole can follow the trajectory: an integrator's least error, 1e-11, grows beyond the tolerance."""
         return self.growth * 1e-11 > self.wanted.tolerance
 
     @property
@@ -96,7 +96,7 @@ class Verdict:
 
     @property
     def error(self) -> float:
-        """The largest of all errors, in units of what they may be; controls that leave their bounds count like constraints."""
+        """The largest of all errors, in units of the tolerance; controls that leave their bounds count like constraints."""
         wanted = self.wanted
         defect, violation = (self.local, 0.0) if self.unstable else (self.defect, self.simulation.violation)
         limits = max(self.excess, violation, self.leaving) / wanted.feasible
@@ -104,13 +104,13 @@ class Verdict:
 
     @property
     def remark(self) -> str:
-        """What is to be said of a trajectory that no simulation can follow; else empty."""
+        """A remark on a trajectory that no simulation can follow; else empty."""
         if not self.unstable:
             return ""
         return f"unstable: open-loop simulation cannot follow (errors grow by {self.growth:.0e}); each element is right to {self.local:.0e}"
 
     def complaints(self) -> list[str]:
-        """Messages about what is not good enough; empty if all is."""
+        """Messages about errors above the tolerance; empty if there are none."""
         found, wanted = [], self.wanted
         if self.unstable:
             if not self.local <= wanted.tolerance:
@@ -130,7 +130,7 @@ class Verdict:
         return found
 
     def scores(self) -> list[ElementScores]:
-        """For each phase the errors of its elements, in units of what they may be."""
+        """The errors of the elements of each phase, in units of the tolerance."""
         wanted, safety = self.wanted, 0.5  # the share of the tolerance that elements have together, were their errors equal
         total = sum(float(phase.defect.sum()) for phase in self.errors)
         # What an error at one element becomes at the end of the trajectory, at least.
@@ -163,7 +163,7 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class ElementScores:
-    """Errors (N,) of a phase's elements in units of what they may be: states and limits; controls; integrals and peaks."""
+    """Errors (N,) of a phase's elements in units of the tolerance: states and limits; controls; integrals and peaks."""
 
     states: np.ndarray
     controls: np.ndarray
@@ -232,7 +232,7 @@ def simulated_objectives(problem: CompiledProblem, simulation: Simulation) -> np
 
 
 def growth(problem: CompiledProblem, trajectory: Trajectory) -> float:
-    """The largest factor by which an error of a state, in scales, grows on its way through a phase, to first order; at least 1."""
+    """The largest factor, to first order, by which an error of a state, in scales, grows through a phase; at least 1."""
     parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
     largest = 1.0
     for phase in problem.phases:

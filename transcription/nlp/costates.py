@@ -1,7 +1,7 @@
 """Costates and the Hamiltonian of an optimal vector, from the multipliers of its own conditions of optimality.
 
-They are those of the sum of the objectives, all minimised, that the vector minimises: with the weights w >= 0 of its conditions, scaled so
-that sum w = 1 in the objectives' own units. A costate is then how much that sum changes by a unit of the state, and H = costates' rates +
+They belong to the weighted sum of the objectives, all minimised, that the vector minimises: with the weights w >= 0 of its conditions,
+scaled so that sum w = 1 in the objectives' own units. A costate is the derivative of that sum by the state, and H = costates' rates +
 weighted integrands, per unit of the phase's time.
 """
 
@@ -35,8 +35,8 @@ def integral_weights(
     of_objectives: np.ndarray,
     of_constraints: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """What a unit of each integral (nq,) counts in the sum of objectives and constraints, each times its multiplier; by phase.
-    quantities: a column q a phase, as `NLP.quantities` gives them."""
+    """The weight of each integral (nq,) in the sum of objectives and constraints, each times its multiplier; by phase. quantities: a column
+    q for each phase, as in `NLP.quantities`."""
     slopes = _slopes(problem).call([*quantities, parameters, of_objectives, of_constraints])
     found = {}
     for phase, slope in zip(problem.phases, slopes, strict=True):
@@ -56,7 +56,7 @@ def _slopes(problem: CompiledProblem) -> ca.Function:
 
 
 def costates(nlp: NLP, z: np.ndarray, found: Multipliers, *, swept: bool = False) -> Costates | None:
-    """The costates of a vector (n,) that is optimal, from its multipliers; None where they are no numbers.
+    """The costates of an optimal vector (n,), from its multipliers; None if they are not finite.
 
     The weights of the objectives are those multipliers over their sum, so that they are of the objectives' own units.
     `swept`: by the adjoint equation, backward from tf, also where the multipliers of the method are costates themselves.

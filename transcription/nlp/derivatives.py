@@ -1,6 +1,6 @@
-"""Sparse derivatives of NLPs: put together from those at points where an NLP has such parts, else of one long list of operations.
+"""Sparse derivatives of NLPs: assembled from derivatives at points if an NLP has such parts, else from one long list of operations.
 
-Those of many rows are built some hundreds of rows at a time: between the pieces it is asked whether the work is to end early.
+Derivatives of many rows are built in pieces of some hundreds of rows, so that the work can end early between the pieces.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def objective_gradients(nlp: NLP) -> ca.Function:
 
 @remembered
 def linear_objectives(nlp: NLP) -> np.ndarray:
-    """Mask (m,) of the objectives whose slopes depend on no variable, as a duration's; False where that does not show."""
+    """Mask (m,) of the objectives with constant slopes, such as a duration; False where the sparsity does not show it."""
     m = len(nlp.problem.goals)
     places, _ = objective_gradients(nlp).jac_sparsity(0, 0).get_triplet()
     return ~np.isin(np.arange(m), np.array(places, dtype=int) % m)
@@ -119,8 +119,8 @@ def weighted_hessian(rows: Any, weights: Any, z: Any, more: Any) -> Any:
 
 
 def _several(rows: Any) -> bool:
-    """Whether rows are derived in pieces. Those that are not made of scalar operations are one piece, since each piece of them would have
-    all operations."""
+    """Whether rows are differentiated in pieces. Rows without scalar operations are one piece, since each piece would have all
+    operations."""
     return rows.numel() > PIECE and isinstance(rows, ca.SX)
 
 

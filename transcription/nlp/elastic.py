@@ -1,10 +1,10 @@
-"""The least violation near a vector: every row of an NLP may give way, and what they give way by is minimised.
+"""The least violation near a vector: every row of an NLP is relaxed by a gap, and the sum of the gaps is minimised.
 
     minimise sum |gap_i| weight_i   subject to   g_lower <= g(z) + gap <= g_upper,   bounds of the variables.
 
-Something is strictly inside wherever it begins, so that IPOPT takes some tens of iterations, also where nothing is feasible; see Nocedal
-and Wright, "Numerical Optimization", 2nd edition, section 18.5. The sum of absolute values is 0 wherever that is possible nearby; elsewhere
-it leaves few rows violated: those in conflict. Dynamics weigh more than what a user demands, so that the result is a trajectory.
+The relaxed program has an interior at every start, so that IPOPT takes some tens of iterations, even if nothing is feasible; see Nocedal
+and Wright, "Numerical Optimization", 2nd edition, section 18.5. The sum of absolute values is 0 if a feasible point is near; else few rows
+stay violated: those in conflict. Dynamics weigh more than the user's constraints, so that the result is a trajectory.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max
 
 
 def opposing(nlp: NLP, z: np.ndarray) -> tuple[str, ...]:
-    """Labels of constraints that are met at a vector (n,) which violates least, and for which others are violated; the strongest first.
+    """Labels of satisfied constraints that conflict with the violated ones at a least violating vector (n,); the strongest first.
 
     Bounds are not among them, nor are the dynamics.
     """
@@ -86,7 +86,7 @@ def opposing(nlp: NLP, z: np.ndarray) -> tuple[str, ...]:
 
 
 def _weights(nlp: NLP) -> np.ndarray:
-    """What a scale of each row (r,) counts; equations of the dynamics a hundred times as much as others."""
+    """Weights of the rows (r,) in their scales; equations of the dynamics weigh a hundred times as much as others."""
     return np.array([100.0 if label.startswith(DYNAMICS) else 1.0 for label in nlp.g_labels])
 
 

@@ -1,4 +1,4 @@
-"""Derivatives of an NLP from those of what it evaluates at points, which are small, and constants."""
+"""Derivatives of an NLP from constants and the small derivatives of the Functions that it evaluates at points."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class FromPoints:
         self._values_by_z = _product(self._slopes, self._A)
 
     def _prepare(self, parts: Parts) -> tuple[ca.DM, list[_Common | None]]:
-        """What is known before z is: derivatives A by z of all inputs that vary, at all points, and what each Function has in common."""
+        """The constant parts: derivatives A by z of all varying inputs, at all points, and the common part of each Function."""
         inputs = parts.inputs.call([self.z], True, False)
         A = ca.vertsplit(_constant(ca.veccat(*inputs), self.z), np.cumsum([0, *(y.numel() for y in inputs)]).tolist())
         begins = parts.inputs.call([ca.DM.zeros(self.z.numel())])
@@ -105,18 +105,18 @@ class FromPoints:
         return ca.triu(H + H.T)
 
     def _along(self, by_q: ca.MX) -> ca.MX:
-        """The derivatives by z of what has these by the quantities."""
+        """Derivatives by z, by the chain rule from those by the quantities."""
         used = np.flatnonzero(np.diff(by_q.sparsity().colind())).tolist()
         return _product(by_q[:, used], self._by_z([part[used, :] for part in self._of_quantities]))
 
     def _by_z(self, slopes: Sequence[ca.DM]) -> ca.MX:
-        """The derivatives by z of what has these by z and by the values at the points."""
+        """Total derivatives by z, from those by z and by the values at the points."""
         return slopes[0] + _product(slopes[1], self._values_by_z)
 
 
 @dataclass(frozen=True, eq=False)
 class _Common:
-    """What a Function has in common at all of its points: u(p)."""
+    """The part u(p) of a Function that is the same at all of its points."""
 
     of: list[int]  # which inputs are p
     slopes: ca.Function  # p -> (u, du/dp)
@@ -160,7 +160,7 @@ def _alike(rows: ca.DM, size: int) -> np.ndarray:
 
 
 def _common(one: _Point, of: np.ndarray, A: ca.DM, before: int, size: int, k: int) -> _Common | None:
-    """What a Function has in common at its k points, whose inputs that vary come after so many and are among so many of all Functions."""
+    """The common part of a Function at its k points, whose varying inputs come after so many and are among so many of all Functions."""
     if not one.u:
         return None
     p, u = one.u

@@ -1,4 +1,4 @@
-"""Residual of the first-order conditions of Pareto optimality at a feasible vector, and the multipliers that leave least of them."""
+"""Residual of the first-order conditions of Pareto optimality at a feasible vector, and the multipliers that minimise it."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Conditions:
         return cls(linear, reduced, adjoints) if np.isfinite(reduced).all() and np.isfinite(adjoints).all() else None
 
     def alone(self, sole: np.ndarray) -> Conditions:
-        """The conditions of the objectives of a mask (m,) alone, of those that are not left out already."""
+        """The conditions for the objectives of a mask (m,) alone, without those already left out."""
         linear, mine = self.linear, sole[np.isfinite(self.linear.scales)]
         columns = np.concatenate([mine, np.ones(len(linear.slack), dtype=bool)])
         linear = replace(linear, scales=np.where(sole, linear.scales, np.inf), of_objectives=linear.of_objectives[mine])
@@ -133,7 +133,7 @@ class Conditions:
 
     @cached_property
     def scaled(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Multipliers (used,) of objectives and (k,) of inequalities, in units, of the least residual; None where none are found.
+        """Multipliers (used,) of objectives and (k,) of inequalities, in units, with the least residual; None if the solve fails.
 
         Where limits depend on each other they are not unique, and round-off would choose: the smallest are taken, and of limits of free
         variables rather than others, first the weights of the objectives, then the multipliers that belong to them.
@@ -149,7 +149,7 @@ class Conditions:
             return None
 
     def multipliers(self) -> Multipliers | None:
-        """Those that leave the least residual, see `scaled`; None where none are found."""
+        """The multipliers with the least residual, see `scaled`; None if the solve fails."""
         if self.scaled is None:
             return None
         nlp, used, n, r = self.linear.nlp, np.isfinite(self.linear.scales), len(self.linear.z), len(self.linear.nlp.g_scale)
@@ -162,7 +162,7 @@ class Conditions:
         return Multipliers(of_objectives / self.linear.scales, (of_equations + above - below) / nlp.g_scale, (upper - lower) / units(nlp))
 
     def _others(self) -> list[np.ndarray]:
-        """Masks of the inequalities, group by group, that are no bounds of free variables."""
+        """Masks, group by group, of the inequalities that are not bounds of free variables."""
         nlp = self.linear.nlp
         kept = np.setdiff1d(np.arange(len(nlp.variables)), nlp.free)
         return [np.isin(np.flatnonzero(one), kept) if k < 2 else one[one] for k, one in enumerate(self.linear.near)]
@@ -300,7 +300,7 @@ def ratio_bounds(conditions: Conditions, i: int, j: int, residual: float) -> tup
 
 
 def ratio_residual(conditions: Conditions, i: int, j: int, ratio: float) -> float:
-    """What is left of the conditions by the best weights of which that of objective j is so many times that of i; infinity: i has none."""
+    """The least residual over weights with w_j / w_i equal to the ratio; infinity: w_i is 0."""
     mixed = np.eye(conditions.scaled[0].size if conditions.scaled else 0)
     share = 1.0 if np.isinf(ratio) else ratio / (1.0 + ratio)
     mixed[:, i] = (1.0 - share) * mixed[:, i] + share * mixed[:, j]
@@ -308,7 +308,7 @@ def ratio_residual(conditions: Conditions, i: int, j: int, ratio: float) -> floa
 
 
 def _largest(good: Callable[[float], bool], ratio: float) -> float:
-    """The largest ratio that is good, from one that is, by growing steps and then bisection; infinite where all larger ones are."""
+    """The largest acceptable ratio, from an acceptable one, by growing steps and then bisection; infinite if all larger ones are."""
     if good(np.inf):
         return float("inf")
     last, change = ratio, 1e-3

@@ -1,4 +1,4 @@
-"""Programs for IPOPT: their scaling, their derivatives, made from those of the NLP, and their end when the work is to end early."""
+"""Programs for IPOPT: scaling, derivatives from those of the NLP, and early termination."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Options = tuple[tuple[str, object], ...]
 
 
 class Watched:
-    """A program for IPOPT: called as what `casadi.nlpsol` returns. Its return status is "User_Requested_Stop" where it was asked to end.
+    """A program for IPOPT, with the call of a `casadi.nlpsol`. Its return status is "User_Requested_Stop" if it was asked to end.
 
     IPOPT looks at its own limits of time between iterations, too: this ends a solve as soon as these could. A factorisation, and the search
     along one step, cannot be ended.
@@ -68,7 +68,7 @@ class Watched:
 
 
 class _Watch(ca.Callback):
-    """What IPOPT calls after each iteration. It takes no data (its inputs are empty) and, through buffers, no time."""
+    """Callback of IPOPT after each iteration. It takes no data (its inputs are empty) and, through buffers, no time."""
 
     def __init__(self) -> None:
         ca.Callback.__init__(self)

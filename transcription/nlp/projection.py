@@ -51,7 +51,7 @@ class TangentProjection:
 
     @cached_property
     def free(self) -> np.ndarray:
-        """The lengths (m,) of the objectives' gradients where no inequality is held: what is left of them is compared with these."""
+        """The lengths (m,) of the objectives' gradients without active inequalities, with which remainders are compared."""
         return np.linalg.norm(self.columns[:, : len(self.scales)], axis=0)
 
     def fall(self, combination: np.ndarray) -> np.ndarray:
@@ -59,7 +59,7 @@ class TangentProjection:
         return self._nearly[0].T @ _on_cone(combination, self._nearly)[0]
 
     def descent(self, combination: np.ndarray) -> np.ndarray:
-        """That descent: a variation (n,) of the vector, in the user's units."""
+        """The steepest descent of a combination (m,): a variation (n,) of the vector, in the user's units."""
         m, (_, of_loose) = len(self.scales), _on_cone(combination, self._nearly)
         beside = self.columns[:, :m] @ combination - self.columns[:, m + self.held :] @ of_loose
         U, sizes, V = _held(self.columns[:, m : m + self.held], RELEASED)
@@ -67,11 +67,11 @@ class TangentProjection:
         return -units(self.nlp) * (self.variations @ np.concatenate([combination, -of_held, -of_loose]))
 
     def slope(self, combination: np.ndarray) -> float:
-        """The slope of a combination (m,) along its steepest descent, as a part of the longest gradient in it; 0 where none can fall."""
+        """The slope of a combination (m,) along its steepest descent, as a fraction of its longest gradient; 0 if it cannot fall."""
         return self._part(combination, self._nearly)
 
     def left(self, weights: np.ndarray) -> float:
-        """What is left of the weighted (m,) sum of gradients, as a part of the longest: 0 at a Pareto optimum with these weights."""
+        """The projected weighted (m,) sum of gradients, as a fraction of the longest gradient: 0 at a Pareto optimum with these weights."""
         return self._part(weights, self._exactly)
 
     @cached_property
@@ -100,7 +100,7 @@ class TangentProjection:
 
 
 def _on_cone(combination: np.ndarray, beside: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """What the cone leaves (q,) of the gradient of a combination, and the multipliers (l,), not negative, that take the most of it."""
+    """The remainder (q,) of a combination's gradient after projection on the cone, and the multipliers (l,) >= 0 of the projection."""
     objectives, loose = beside
     target, lengths = objectives @ combination, np.linalg.norm(loose, axis=0)
     used, multipliers = lengths > 0, np.zeros(len(lengths))

@@ -5,7 +5,7 @@
 With positive weights this is Pascoletti and Serafini, "Scalarizing vector optimization problems", JOTA 42(4), 1984: from the reference
 along the weights to the front. A weight of 0 makes the reference a hard limit, so that one positive weight is the epsilon-constraint
 method; an infinite reference leaves an objective out, so that one positive weight and nothing else is plain minimisation. With the
-objectives of a feasible point as the reference, alpha <= 0 means that none got worse than there.
+objectives of a feasible point as the reference, alpha <= 0 means that none is worse than at this point.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 @dataclass(frozen=True)
 class SolveNumbers:
-    """Numbers of a gradient solve, as measured on the standard problems and the re-entries."""
+    """Constants of a gradient solve, measured on the standard problems and the re-entries."""
 
     accuracy: float = 1e-9  # IPOPT's tolerance: what a certificate of optimality far below 1e-6 needs
     # Multiple of their scale, or of their value at the start, up to which peaks may rise: nothing else bounds those not minimised.
@@ -50,7 +50,7 @@ SOLVE = SolveNumbers()
 
 @dataclass(frozen=True)
 class _Strategy:
-    """A strategy of IPOPT and what it is allowed."""
+    """A strategy of IPOPT and its limits."""
 
     options: Options
     share: float  # of the iterations
@@ -164,7 +164,7 @@ def scalarize(
     persistent: bool = True,
     near: bool = False,
 ) -> Solved:
-    """Go down from a start (n,) to the front: least alpha with F - reference <= alpha weights (m,); ceiling (m,), margin (r,)."""
+    """Descend from a start (n,) to the front: least alpha with F - reference <= alpha weights (m,); ceiling (m,), margin (r,)."""
     start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
     if stopping():
         return not_begun(nlp, start)
@@ -214,7 +214,7 @@ def _strategies(feasible: bool, tightened: bool) -> tuple[_Strategy, ...]:
 
 
 def _own_scales(nlp: NLP, z: np.ndarray, F: np.ndarray) -> np.ndarray:
-    """What counts as one in objectives (m,) at a vector: their size, 1e-4 of their change where near zero, no more than usual."""
+    """Units of objectives (m,) at a vector: their size, 1e-4 of their change where near zero, no more than usual."""
     usual = nlp_scales(nlp)
     change = np.abs(np.nan_to_num(np.array(gradients(nlp)(z)[0]))) @ nlp.scale
     own = np.maximum(np.abs(F), 1e-4 * change)
@@ -262,7 +262,7 @@ def _task(
 
 
 def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> Solved:
-    """Runs of IPOPT, each from where the last one stopped, as long as that is an end of a box that the problem does not have."""
+    """Runs of IPOPT, each from the last point of the one before, as long as that lies on an artificial bound of the box."""
     iterations = 0
     for _ in range(SOLVE.restarts + 1):
         solved, stuck = _attempt(nlp, task, start, settings, strategy)
@@ -276,7 +276,7 @@ def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 
 
 def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> tuple[Solved, bool]:
-    """One run of IPOPT, and whether it stopped at an end of a box that the problem does not have."""
+    """One run of IPOPT, and whether it stopped on an artificial bound of the box."""
     tolerance = settings.tolerance
     options = (*COMMON, ("mumps_scaling", 77 if settings.scaled else 0), ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
@@ -326,8 +326,8 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
 
 
 def _box(nlp: NLP, z: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bounds of the variables around z, (n,) each, and which of them the problem does not have, (2, n). Periodic variables get one more
-    period on either side, so that a bound never stops them; peaks, which have none, a multiple of what they are."""
+    """Bounds of the variables around z, (n,) each, and the mask (2, n) of the artificial ones among them. Periodic variables get one more
+    period on either side, so that a bound never stops them; peaks, which have none, a multiple of their values."""
     lower, upper = nlp.lower - nlp.period, nlp.upper + nlp.period
     upper = np.where(np.isinf(upper), SOLVE.peak_limit * np.maximum(nlp.scale, np.abs(z)), upper)
     reach = np.full(len(z), np.inf)
@@ -337,7 +337,7 @@ def _box(nlp: NLP, z: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray
 
 
 def _rank(task: _Task, solved: Solved, tolerance: float) -> tuple[float, float]:
-    """Feasible before infeasible, by what they miss; then by alpha."""
+    """Order: by violation, feasible ones alike; then by alpha."""
     missed = max(solved.violation, task.excess(solved.F))
     value = task.value(solved.F)
     return (missed if missed > tolerance else 0.0, value if np.isfinite(value) else np.inf)
