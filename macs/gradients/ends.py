@@ -239,7 +239,7 @@ def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], fo
 
 
 def check_points(points: int, m: int) -> None:
-    """Raise ValueError if so many points are too few for a front of m objectives."""
+    """Raise ValueError if the number of points is too small for a front of m objectives."""
     if m == 1:
         raise ValueError("a problem with one objective has no front to sweep; use optimize")
     if points < m:

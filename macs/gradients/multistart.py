@@ -70,7 +70,7 @@ class Starts:
         self._nlp, self._rng, self.drawn = nlp, rng, drawn
 
     def draw(self, best: np.ndarray | None = None) -> np.ndarray:
-        """The next start, a full vector; `best` (n,) is the best that is known. Returns (1 or 2, n)."""
+        """The next start, a full vector; `best` (n,) is the best known vector. Returns (1 or 2, n)."""
         nlp, rng, first = self._nlp, self._rng, MULTISTART.everywhere
         drawn, self.drawn = self.drawn, self.drawn + 1
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]

@@ -143,7 +143,7 @@ class FrontRefinement:
             found[i] = self.found[i].best.F
 
     def points(self, elapsed: float, stopped: str) -> Points:
-        """The front with the refined points, in the same order, and what they cost."""
+        """The front with the refined points, in the same order, and their costs."""
         front = self.front
         rows = [self._rows.get(i, front[[i]]) for i in range(len(front))]
         for i in set(self.chosen) - set(self.found):
@@ -283,7 +283,7 @@ class _FineFront:
             found |= {i: self.done[i].F} if i in self.done else {}
 
     def points(self) -> Points:
-        """The front with the points that are done, and what they cost."""
+        """The front with the finished points, and their costs."""
         front, done = self.front, list(self.done)
         Z = np.array([self.done[i].z for i in done]).reshape(-1, len(self.nlp.variables))
         found = from_vectors(self.nlp, Z, front.solver, front.stats, sort=False, **certified(self.nlp, Z, self.units))

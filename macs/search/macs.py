@@ -275,7 +275,7 @@ class MACS(Settings, Solver):
         return PreferenceGuide(self.prefer, evaluator.goals).objection(state.archive.F)
 
     def about(self) -> dict[str, Any]:
-        """See `SearchMethod.about`; a preference is there only if there is one."""
+        """See `SearchMethod.about`; with the preference, if there is one."""
         given = {} if self.prefer is None else {"prefer": written(self.prefer)}
         return {"name": type(self).__name__, "settings": self.as_data() | given}
 

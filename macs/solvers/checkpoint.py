@@ -236,7 +236,7 @@ def sealed(content: bytes, version: int = CHECKPOINT_VERSION) -> bytes:
 
 
 def read_file(path: str | PathLike[str]) -> bytes:
-    """What follows the first line of a file, checked against its checksum."""
+    """The document of a file, checked against the checksum of the first line."""
     if not stat.S_ISREG(Path(path).stat().st_mode):
         raise ValueError("is no ordinary file")  # reading a device or a pipe may never end
     with Path(path).open("rb") as file:

@@ -125,8 +125,8 @@ def _several(rows: Any) -> bool:
 
 
 def _pieces(rows: Any, z: Any) -> Iterator[tuple[int, int, list[int]]]:
-    """The first row of each piece, that after its last, and the entries of z on which it depends: derivatives by all of z would take time
-    in proportion to z for each piece."""
+    """The row ranges of the pieces, and the entries of z on which each depends: derivatives by all of z would take time in proportion to z
+    for each piece."""
     by_row, count = ca.jacobian_sparsity(rows, z).T, rows.numel()
     starts, columns = np.array(by_row.colind()), np.array(by_row.row(), dtype=int)
     for first in range(0, count, PIECE):

@@ -173,7 +173,7 @@ def _common(one: _Point, of: np.ndarray, A: ca.DM, before: int, size: int, k: in
 
 
 def _diagonal(blocks: Sequence[tuple[ca.Sparsity, int]]) -> ca.Sparsity:
-    """The sparsity of a matrix with so many of each of these on its diagonal."""
+    """The sparsity of a block-diagonal matrix with given numbers of these blocks."""
     return ca.diagcat(*(ca.kron(ca.DM.eye(k), ca.DM(one, 1.0)) for one, k in blocks)).sparsity()
 
 

@@ -83,7 +83,7 @@ class TangentProjection:
         return self._beside(1e-6)
 
     def _beside(self, released: float) -> tuple[np.ndarray, np.ndarray]:
-        """The gradients of the objectives (q, m) and of what may be left (q, l) beside what is held."""
+        """The gradients of the objectives (q, m) and of constraints that may be left (q, l), orthogonal to the active ones."""
         m = len(self.scales)
         U = _held(self.columns[:, m : m + self.held], released)[0]
         others = np.delete(self.columns, slice(m, m + self.held), axis=1)
@@ -137,7 +137,7 @@ def projection(nlp: NLP, z: np.ndarray, F_scales: np.ndarray | None = None) -> T
 
 
 def _held(columns: np.ndarray, released: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The singular vectors (q, r), values (r,) and vectors (r, k) of the gradients of what is held, without those that need not be."""
+    """The singular vectors (q, r), values (r,) and vectors (r, k) of the active gradients, without negligible singular values."""
     U, sizes, V = np.linalg.svd(columns, full_matrices=False)
     some = sizes > released
     return U[:, some], sizes[some], V[some]
