@@ -136,13 +136,18 @@ class MultistartStopping:
         return int(np.count_nonzero(differences <= (self._same if same is None else same)))
 
     @property
+    def complete(self) -> bool:
+        """Whether further starts are not expected to find another optimum."""
+        found, optima = self.converged, self.optima()
+        unseen = self._unseen if optima == 1 else MULTISTART.unseen
+        return found > optima and optima * (optima + 1) <= unseen * found * (found - 1)
+
+    @property
     def enough(self) -> bool:
         """Whether further starts are not expected to find another optimum, or have found nothing better for long."""
-        found, optima = self.converged, self.optima()
-        if not found:
+        if not self.converged:
             return self.starts >= MULTISTART.fewest
-        unseen = self._unseen if optima == 1 else MULTISTART.unseen
-        if found > optima and optima * (optima + 1) <= unseen * found * (found - 1):
+        if self.complete:
             return True
         return self.starts >= min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most)
 

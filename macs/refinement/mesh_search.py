@@ -18,7 +18,7 @@ from transcription import DFET
 from transcription.base import NLP, Transcription
 from transcription.catalogue import stated
 from transcription.meshed import Meshed
-from transcription.meshes.verdict import Wanted
+from transcription.meshes.verdict import Wanted, simulated_objectives
 from transcription.nlp.scalarized import Solved
 from transcription.phases.mesh import PhaseMesh
 from transcription.stopping import Stopped
@@ -59,6 +59,9 @@ class MeshSearchLimits:
     hopeless: int = 2  # coarse meshes without anything feasible after which no other is tried
     infeasible: tuple[int, int] = (3, 3)  # fewest and most starts without a feasible vector on the first of these
     clearly: float = 1e-3  # part of its unit by which an objective on a coarse mesh differs that is another optimum
+    # Parts of `WORK.little` that starts of an end take on the first mesh, and on another one, which only confirms it.
+    starts: tuple[float, float] = (0.4, 0.2)
+    unseen: float = 0.05  # probability of another optimum below which starts on that are enough if all led to one
     refined: int = 2  # most other optima that are refined
     elements: int = 40  # most of a phase on a common mesh: a search evaluates it thousands of times
     near: float = 0.25  # an edge is left out if the element is then longer than the shortest there by at most this part
@@ -176,18 +179,27 @@ class TaskOptima:
         self.all: list[MeshedOptimum] = []
         self._units = np.full(len(task.weights), np.inf)
 
-    def add(self, method: Meshed, nlp: NLP, solved: Solved, rule: MultistartStopping) -> None:
-        """Refine the result of a solve on a coarse mesh if it converged."""
+    def add(self, method: Meshed, nlp: NLP, solved: Solved, rule: MultistartStopping, ends: Sequence[np.ndarray] = ()) -> None:
+        """Refine the result of a solve on a coarse mesh if it converged; `ends` are the objectives (m,) of the other ends of a front."""
         loop = self.loop
         one = MeshedOptimum(method, nlp, solved, rule, self.task.loss(solved.F))
         if solved.status == CONVERGED:
             # Objectives that are large only where an attempt is poor are not to be judged by that.
-            self._units = units = np.minimum(self._units, loop.units(solved.F[None], nlp, solved.z))
+            self._units = units = np.minimum(self._units, loop.units(np.array([solved.F, *ends]), nlp, solved.z))
             task = replace(self.task, units=units) if self.end is None else LexicographicEnd.of(self.end, units, solved.F)
             with suppress(Stopped):
                 begun = loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True)
                 one = self._refined(one, loop.refine(begun, task), units)
         self.all.append(one)
+
+    def promising(self, method: Meshed, nlp: NLP, solved: Solved) -> bool:
+        """Whether a result on a coarse mesh may be better than an optimum that is good: its simulation is better, too, if it ends."""
+        best = self.best
+        if not best.good:
+            return True
+        verdict = self.loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), self._units, True).verdict
+        simulated = self.task.loss(simulated_objectives(self.loop.problem, verdict.simulation))
+        return self.task.loss(solved.F) < best.loss and not simulated >= best.loss
 
     def _refined(self, one: MeshedOptimum, refinement: Refinement, units: np.ndarray) -> MeshedOptimum:
         best, task = refinement.best, self.task
@@ -243,8 +255,6 @@ class MeshSearch:
         self.coarse: dict[Meshed, list[Solved]] = {}  # the results of all tasks on a coarse mesh
         self._explored: list[set[Meshed]] = [set() for _ in tasks]
         self.exhausted, self._hopeless = False, 0
-        # The starts of an end are on two meshes.
-        self._budget = 0.5 * WORK.little if ends else WORK.little
 
     def go(self, coarse: Sequence[Meshed]) -> None:
         """Solve on coarse meshes and refine the results, until all are good or another mesh does not pay; then solve from other starts."""
@@ -266,7 +276,9 @@ class MeshSearch:
                 left.insert(0, FINEST)
         if self._starts is None:
             for i, optima in enumerate(self.tasks):
-                if not optima.best.certain(optima.task):
+                best = optima.best
+                complete = self._ends and best.good and best.rule.complete
+                if not (complete or best.certain(optima.task)):
                     self._elsewhere(i)
 
     def best(self, i: int) -> MeshedOptimum:
@@ -280,9 +292,8 @@ class MeshSearch:
         if any(one.refinement is None for one in best):
             return self._hopeless >= SEARCH.hopeless or self.loop.ended
         passable = all(one.good or optima.passable for one, optima in zip(best, self.tasks, strict=True))
-        # The points of a front get meshes of their own in the end.
-        little = self._ends or self.loop.work >= WORK.little
-        return all(one.good for one in best) or self.loop.ended or (passable and little)
+        # The points of a front get meshes of their own in the end, and other starts on another mesh anyway.
+        return self._ends or all(one.good for one in best) or self.loop.ended or (passable and self.loop.work >= WORK.little)
 
     def _begin(self, method: Meshed) -> None:
         """Solve all tasks on a coarse mesh, from further starts if not yet done, and refine the best result; if that gives no good point,
@@ -302,7 +313,7 @@ class MeshSearch:
             if self._starts or self._explored[i] or solved.status != CONVERGED or solver.is_least(solved, optima.task):
                 return solved
             self._explored[i].add(method)
-            others = self._drawn(optima, solver, solved, rule, self.loop.work + self._budget)
+            others = self._drawn(optima, solver, solved, rule, self.loop.work + WORK.little * (SEARCH.starts[0] if self._ends else 1.0))
             return min([solved, *others], key=optima.task.rank)
 
         self.coarse[method] = best = lexicographic_ends(solver, single) if self._ends else [single(0)]
@@ -313,7 +324,8 @@ class MeshSearch:
         for optima, one, other, rule in zip(self.tasks, first, best, rules, strict=True):
             if optima.all and optima.best.good:
                 continue
-            optima.add(method, nlp, other, rule)
+            front = [end.F for end in best if self._ends and end is not other and end.status == CONVERGED]
+            optima.add(method, nlp, other, rule, front)
             if other is not one and not self._ends and not optima.best.good and not self.loop.ended:
                 optima.add(method, nlp, one, rule)
 
@@ -338,7 +350,7 @@ class MeshSearch:
         best optimum or, if that is not good, different from it."""
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
         others: list[tuple[float, Meshed, Solved, MultistartStopping]] = []
-        budget = self._budget if self._ends else max(SEARCH.share * before, WORK.little)
+        budget = SEARCH.starts[1] * WORK.little if self._ends else max(SEARCH.share * before, WORK.little)
         best = optima.best
         for method in dict.fromkeys((best.method, SECOND)):
             if method not in self._explored[i]:
@@ -346,9 +358,12 @@ class MeshSearch:
                     others += self._others(i, method, before + budget)
         usual, most = loop.most_work, loop.work + budget
         loop.most_work = most if usual is None else min(most, usual)
+        rivals = [other.best.refinement for other in self.tasks if self._ends and other is not optima]
+        front = [refinement.best.F for refinement in rivals if refinement is not None]
         for _, method, solved, rule in sorted(others, key=lambda other: other[0])[: SEARCH.refined]:
-            if not loop.ended:
-                optima.add(method, self.solvers[method].nlp, solved, rule)
+            nlp = self.solvers[method].nlp
+            if not loop.ended and (not self._ends or optima.promising(method, nlp, solved)):
+                optima.add(method, nlp, solved, rule, front)
         loop.most_work = usual
 
     def _others(self, i: int, method: Meshed, most: float) -> list[tuple[float, Meshed, Solved, MultistartStopping]]:
@@ -360,18 +375,23 @@ class MeshSearch:
         if method == best.method:
             solver, known, rule = self.solvers[method], best.solved, best.rule
         else:
-            nlp, rule = loop.programs(method), MultistartStopping()
+            nlp = loop.programs(method)
+            rule = MultistartStopping(SEARCH.unseen) if self._ends else MultistartStopping()
             solver = self.solvers.setdefault(method, MultistartSolver(nlp, None, 1, self._rng, loop.solves))
             with loop.solves.at_most(MULTISTART.iterations):
-                known = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), optima.task)
+                known = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), optima.task, self._ends)
             rule.add(self._loss(optima, known))
         least = optima.task.loss(known.F) if known.status == CONVERGED else np.inf
+        # What is better by no more than the error of this mesh may be the same optimum.
+        limit = least
+        if self._ends and best.good:
+            limit = min(least, best.loss) - (abs(least - best.loss) if np.isfinite(least) else 0.0)
         seen, found = [least], list[tuple[float, Meshed, Solved, MultistartStopping]]()
         for solved in self._drawn(optima, solver, known, rule, most):
             loss = optima.task.loss(solved.F)
             if all(abs(loss - other) > SEARCH.clearly * best.unit for other in seen):
                 seen.append(loss)
-                if loss < least or not (best.good or self._ends):
+                if loss < limit or not (best.good or self._ends):
                     found.append(((loss - least) / best.unit, method, solved, rule))
         return found
 

@@ -228,7 +228,8 @@ def test_what_one_coarse_mesh_cannot_do_is_not_called_infeasible():
     problem.maximize("speed", burn.final(v))
     problem.maximize("carried", ballast + 0)
     ends = payoff(problem)
-    assert ends.verified.all() and ends.objectives[:, 0] == pytest.approx([364.104, 146.618], rel=1e-4)
+    # Ends may miss what other points may: 1e-3 of the range.
+    assert ends.verified.all() and ends.objectives[:, 0] == pytest.approx([364.104, 146.618], abs=1e-3 * (364.104 - 146.618))
 
 
 @pytest.mark.parametrize("tool", [optimize, lambda *arguments, **more: payoff(*arguments, **more)[0]])
