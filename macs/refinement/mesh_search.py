@@ -350,12 +350,13 @@ class MeshSearch:
         best optimum or, if that is not good, different from it."""
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
         others: list[tuple[float, Meshed, Solved, MultistartStopping]] = []
-        budget = SEARCH.starts[1] * WORK.little if self._ends else max(SEARCH.share * before, WORK.little)
+        budget = max(SEARCH.share * before, WORK.little)
+        starts = SEARCH.starts[1] * WORK.little if self._ends else budget
         best = optima.best
         for method in dict.fromkeys((best.method, SECOND)):
             if method not in self._explored[i]:
                 with suppress(Stopped):
-                    others += self._others(i, method, before + budget)
+                    others += self._others(i, method, before + starts)
         usual, most = loop.most_work, loop.work + budget
         loop.most_work = most if usual is None else min(most, usual)
         rivals = [other.best.refinement for other in self.tasks if self._ends and other is not optima]
