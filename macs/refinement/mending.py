@@ -25,7 +25,7 @@ from ..io.console import working
 from ..pareto.dominance import extremes
 from ..pareto.spread import Guide, spread
 from .front_refinement import FrontRefinement, solve_on
-from .mesh_loop import OnMesh, Programs
+from .mesh_loop import OnMesh, Programs, differentiable
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,9 @@ class _Mending:
         return Points.concatenate([points, ends[better]]).replace(stats=points.stats, solver=points.solver)
 
     def fill_gaps(self, points: Points, size: int, guide: Guide | None) -> Points:
-        """The points, filled up from verified ones; see `fill_gaps`."""
+        """The points, filled up from verified ones if gradients can; see `fill_gaps`."""
+        if not differentiable(points.compiled()):
+            return points
         most = self._most_work(points, size - int(points.verified.sum()))
         return fill_gaps(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations, guide)
 

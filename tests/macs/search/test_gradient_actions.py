@@ -119,7 +119,7 @@ def test_what_nothing_makes_feasible_is_projected(monkeypatch) -> None:
     assert not len(state.archive) and not len(state.optima)
     assert evaluator.counts.evaluations == 20 and evaluator.counts.fallbacks == 10 == state.gradients.hopeless
     few = projecting(walk(least=0.5), METHOD)
-    MACS(agents=4).begin(few, 13, np.random.default_rng(0))
+    MACS().begin(few, 13, np.random.default_rng(0))
     assert few.counts.evaluations == 13, "as far as the budget goes"
 
 
