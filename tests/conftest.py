@@ -21,7 +21,6 @@ settings.load_profile("macs")
 
 LONGEST = (
     "test_every_point_of_a_front_flown_again",
-    "test_the_four_ends_are_flights",
     "test_points_that_the_default_search_calls_verified_are_right",
     "test_goddard_on_the_papers_mesh",
     "test_the_two_step_design_is_dominated",

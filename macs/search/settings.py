@@ -26,7 +26,7 @@ GONE = {
     **dict.fromkeys(
         ("rho", "F", "CR", "contraction", "max_contractions", "adaptive_coordinates", "redraw", "reseed", "shorten"), ELSEWHERE
     ),
-    **dict.fromkeys(("social_moves", "keep_velocity", "breeding", "restore", "exponent", "lone", "directions", "sample"), ELSEWHERE),
+    **dict.fromkeys(("social_moves", "breeding", "restore", "exponent", "lone", "directions", "sample"), ELSEWHERE),
     **dict.fromkeys(("momentum", "concentration", "experience", "memory", "keep_velocity"), "it brought no more than noise; leave it out"),
     "social": "all agents do social actions; leave it out",
     "coordinates": "leave it out, or use MACS.paper(), which scans all coordinates",
