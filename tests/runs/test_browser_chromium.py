@@ -5,6 +5,7 @@ Skipped where there is no Chromium with its driver (Debian: chromium, chromium-d
 
 from __future__ import annotations
 
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -126,17 +127,20 @@ def package_alone() -> bytes:
 def test_a_hundred_runs_of_a_hundred_points_open_with_the_work_of_the_drawing_package(tmp_path):
     contents = {"package alone": package_alone(), "10 points": front_page(flights(10)), "10 000 points": study_like(100, 100)}
     assert len(contents["10 000 points"]) < 15e6
-    seconds, work = {}, {}
-    for name, content in contents.items():
-        path = tmp_path / "page.html"
-        path.write_bytes(content)
-        seconds[name], work[name], errors = opened_alone(path)  # a new browser, as it keeps what it has compiled
-        assert errors == []
+    seconds, work = defaultdict(list), defaultdict(list)
+    for _ in range(3):  # side by side: the least of each is what its page costs, whatever else the machine does
+        for name, content in contents.items():
+            path = tmp_path / "page.html"
+            path.write_bytes(content)
+            ready, spent, errors = opened_alone(path)  # a new browser, as it keeps what it has compiled
+            assert errors == []
+            seconds[name].append(ready)
+            work[name].append(spent)
     for name in contents:
-        print(f"{name}: {seconds[name]:.2f} s until the figure is there, {work[name]:.2f} s of work on the main thread")
+        print(f"{name}: {min(seconds[name]):.2f} s until the figure is there, {min(work[name]):.2f} s of work on the main thread")
     # Two seconds are asked for: on two idle cores it took 1.2 s with this work. On a busy machine seconds say nothing of the page.
-    assert work["10 000 points"] < 1.25 * work["package alone"]
-    assert work["10 points"] < 0.85 * work["package alone"]
+    assert min(work["10 000 points"]) < 1.25 * min(work["package alone"])
+    assert min(work["10 points"]) < 0.85 * min(work["package alone"])
 
 
 @pytest.mark.slow

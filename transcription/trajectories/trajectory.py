@@ -170,7 +170,7 @@ class PhaseTrajectory:
         return wrapped(self.control.on_elements(tau), self.control_variables)
 
     def sampled(self, tau: np.ndarray, parameters: Sequence[float] | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """States (k, nx), controls (k, nu), times (k,) at `tau` of all elements, one after the other; s = [t0, tf, *parameters]."""
+        """States (k, nx), controls (k, nu), times (k,) at `tau` of all elements, one after the other; s holds t0, tf and the parameters."""
         times, x, u = self.state.times(tau), self.state.on_elements(tau), self.controls_on_elements(tau)
         s = np.array([self.t0, self.tf, *parameters])
         return x.reshape(times.size, x.shape[2]), u.reshape(times.size, u.shape[2]), times.ravel(), s
