@@ -16,27 +16,22 @@ from macs.io.interrupts import Stopped
 from ..report.page import PageHeader, digest
 from .contest import CONTESTS
 from .contract import Bench, Row, save
-from .density import DENSITY
-from .growth import GENERATION, SCALE
+from .growth import SCALE
 from .inner import INNER, POPULATION
 from .parts import PARTS_BENCH
 from .peers import PEERS
-from .prefer import PREFER
 from .published import METHODS, STANDARD
 from .searches import FRONT, SEARCH
 from .study import STUDY
 
 BENCHES: dict[str, Bench] = {
     **CONTESTS,
-    "density": DENSITY,
     "front": FRONT,
-    "generation": GENERATION,
     "inner": INNER,
     "methods": METHODS,
     "parts": PARTS_BENCH,
     "peers": PEERS,
     "population": POPULATION,
-    "prefer": PREFER,
     "scale": SCALE,
     "search": SEARCH,
     "standard": STANDARD,

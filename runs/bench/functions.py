@@ -128,11 +128,11 @@ class PlainFunction:
         return plain_problem(*self.problem(), names=[f"f{k + 1}" for k in range(self.objectives)], name=self.name)
 
 
-def from_pymoo(name: str, **sizes: int) -> tuple[Any, ...]:
+def from_pymoo(name: str, *sizes: int, **more: int) -> tuple[Any, ...]:
     """A problem of pymoo, which has its own bounds."""
     from pymoo.problems import get_problem
 
-    return (get_problem(name, **sizes),)
+    return (get_problem(name, *sizes, **more),)
 
 
 def lattice_on(m: int) -> np.ndarray:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 from unittest.mock import patch
 
@@ -23,6 +24,7 @@ from macs.search.state import Credit
 from problems import load
 
 from .contract import Bench, Effort, Row, short
+from .functions import from_pymoo
 
 WHOLE = "all parts"
 FIRST_SEED = 101
@@ -98,17 +100,6 @@ class AblationCase:
         return solver.minimize(*stated(), evaluations=self.evaluations, seed=seed, progress=False)
 
 
-def from_pymoo(name: str, *sizes: Any, **more: Any) -> Stated:
-    """A problem of pymoo, which has its own bounds."""
-
-    def stated() -> tuple[Any, ...]:
-        from pymoo.problems import get_problem
-
-        return (get_problem(name, *sizes, **more),)
-
-    return stated
-
-
 def crash(X: np.ndarray) -> np.ndarray:
     """Mass, acceleration and intrusion of a vehicle in a crash (Liao, Li, Yang, Zhang and Li 2008)."""
     a, b, c, d, e = X.T
@@ -122,24 +113,25 @@ def crash(X: np.ndarray) -> np.ndarray:
 
 def thin_kursawe(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Kursawe's function on a surface, an equality stated as a limit on an absolute value."""
-    from pymoo.problems import get_problem
-
-    return get_problem("kursawe").evaluate(X), np.abs(X[:, :1] + 0.5 * X[:, 1:2] ** 2 - X[:, 2:] - 1.0) - 1e-3
+    return from_pymoo("kursawe")[0].evaluate(X), np.abs(X[:, :1] + 0.5 * X[:, 1:2] ** 2 - X[:, 2:] - 1.0) - 1e-3
 
 
 PROBLEMS: dict[str, dict[str, Stated]] = {
-    "curves": {**{f"WFG{k}": from_pymoo(f"wfg{k}", n_var=12, n_obj=2) for k in (2, 4, 9)}, "Kursawe": from_pymoo("kursawe")},
+    "curves": {
+        **{f"WFG{k}": partial(from_pymoo, f"wfg{k}", n_var=12, n_obj=2) for k in (2, 4, 9)},
+        "Kursawe": partial(from_pymoo, "kursawe"),
+    },
     "constraints": {
-        **{name: from_pymoo(name.lower()) for name in ("OSY", "TNK", "CTP2")},
-        **{f"DASCMOP{k}": from_pymoo(f"dascmop{k}", 5) for k in (1, 4)},
+        **{name: partial(from_pymoo, name.lower()) for name in ("OSY", "TNK", "CTP2")},
+        **{f"DASCMOP{k}": partial(from_pymoo, f"dascmop{k}", 5) for k in (1, 4)},
         "thin Kursawe": lambda: (thin_kursawe, [(-5.0, 5.0)] * 3),
         "welded_beam": None,
     },
     "surfaces": {
-        **{f"WFG{k}": from_pymoo(f"wfg{k}", n_var=14, n_obj=3) for k in (4, 9)},
+        **{f"WFG{k}": partial(from_pymoo, f"wfg{k}", n_var=14, n_obj=3) for k in (4, 9)},
         "crash": lambda: (crash, [(1.0, 3.0)] * 5),
     },
-    "many objectives": {f"WFG{k}": from_pymoo(f"wfg{k}", n_var=14, n_obj=5) for k in (4, 9)},
+    "many objectives": {f"WFG{k}": partial(from_pymoo, f"wfg{k}", n_var=14, n_obj=5) for k in (4, 9)},
     "trajectories": dict.fromkeys(("goddard", "orbit_rise", "landing_site", "aerocapture")),
     "gradients": dict.fromkeys(("goddard", "landing_site")),
 }
