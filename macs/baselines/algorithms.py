@@ -13,7 +13,7 @@ from problems.checks import check_choice
 from ..evaluation.evaluator import Evaluator
 from ..pareto.directions import check_directions, pair_up, population_size, reference_directions, tchebycheff
 from .population import Members, State
-from .pymoo_adapter import Baseline, rows_of
+from .pymoo_adapter import Baseline
 
 
 def variation(crossover: float, crossover_eta: float, mutation_eta: float, **more: Any) -> dict[str, Any]:
@@ -58,22 +58,18 @@ class RankedState(State):
 class Ranked(Genetic):
     """Baseline whose individuals have ranks and crowding distances, which tournaments compare."""
 
-    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> RankedState:
-        return RankedState(**common, rank=np.full(len(members), -1), crowding=np.full(len(members), np.nan))
+    STATE = RankedState
+
+    def _first(self, members: Members, rng: np.random.Generator, evaluator: Evaluator) -> State:
+        return RankedState.of(members, rng, rank=np.full(len(members), -1), crowding=np.full(len(members), np.nan))
 
     def _restore(self, algorithm: Any, state: RankedState, individuals: Any) -> None:
+        super()._restore(algorithm, state, individuals)
         individuals.set("rank", state.rank, "crowding", state.crowding)
-        algorithm.pop = individuals
 
     def _keep(self, algorithm: Any, state: RankedState, table: Members) -> None:
-        state.rank = _numbers(algorithm.pop, "rank", -1).astype(int)
-        state.crowding = _numbers(algorithm.pop, "crowding", np.nan)
-
-
-def _numbers(individuals: Any, key: str, missing: float) -> np.ndarray:
-    """Values (n,) of an attribute of individuals; `missing` for an individual without it."""
-    values = [one.get(key) for one in individuals]
-    return np.array([missing if value is None else value for value in values], dtype=float)
+        rank, state.crowding = (np.array(algorithm.pop.get(name), dtype=float) for name in ("rank", "crowding"))  # None as NaN
+        state.rank = np.nan_to_num(rank, nan=-1).astype(int)
 
 
 @dataclass(frozen=True)
@@ -107,12 +103,11 @@ class NSGA2(Ranked):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import NSGA2
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = NSGA2(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = NSGA2(population=20).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 5
+    True
     """
 
     PYMOO = "nsga2:NSGA2"
@@ -138,16 +133,15 @@ class AGEMOEA2(Ranked):
     Raises
     ------
     ValueError
-        If a setting is outside its range, numba is not installed, or there is a single objective.
+        As for `NSGA2`; also if numba is not installed, or there is a single objective.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import AGEMOEA2
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = AGEMOEA2(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = AGEMOEA2(population=20).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 5
+    True
     """
 
     PYMOO = "age2:AGEMOEA2"
@@ -186,28 +180,22 @@ class SMSEMOA(Genetic):
     Parameters
     ----------
     population, crossover, crossover_eta, mutation_eta, handling, penalty, degree
-        As for `NSGA2`.
-
-    Raises
-    ------
-    ValueError
-        If a setting is outside its range, or there is a single objective.
+        As for `NSGA2`. A single objective is refused.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import SMSEMOA
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = SMSEMOA(population=10).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = SMSEMOA(population=10).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 5
+    True
     """
 
     PYMOO = "sms:SMSEMOA"
     SEVERAL = True
 
     def _restore(self, algorithm: Any, state: State, individuals: Any) -> None:
-        algorithm.pop = individuals
+        super()._restore(algorithm, state, individuals)
         failed = ~np.isfinite(individuals.get("CV")[:, 0])
         if failed.any() and not failed.all():  # pymoo takes the ranges of all members; no objective of a failed one is used otherwise
             individuals[failed].set("F", np.tile(individuals[~failed].get("F").max(axis=0), (failed.sum(), 1)))
@@ -263,10 +251,15 @@ class NormalisedState(State):
     """State of NSGA-III, with the points by which objectives, as presented to the algorithm, are normalised."""
 
     SHAPES: ClassVar[dict[str, str]] = {"ideal": "presented", "worst": "presented", "extreme_points": "e presented"}
+    CARRIED: ClassVar[dict[str, str]] = {
+        "ideal": "survival.norm.ideal_point",
+        "worst": "survival.norm.worst_point",
+        "extreme_points": "survival.norm.extreme_points",
+    }
 
-    ideal: np.ndarray  # ideal, worst: (m,): Best and worst value of each objective so far; infinite before the first population
-    worst: np.ndarray
-    extreme_points: np.ndarray  # (m, m): Points that span the hyperplane; none before the first population
+    ideal: np.ndarray | None = None  # ideal, worst: (m,): Best and worst value of each objective so far
+    worst: np.ndarray | None = None
+    extreme_points: np.ndarray | None = None  # (m, m): Points that span the hyperplane
 
 
 @dataclass(frozen=True)
@@ -301,41 +294,25 @@ class NSGA3(DirectedGenetic):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import NSGA3
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = NSGA3(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = NSGA3(population=20).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 5
+    True
     """
 
     whole: bool = False
 
     PYMOO = "nsga3:NSGA3"
+    STATE = NormalisedState
 
     def _arguments(self, m: int) -> dict[str, Any]:
         from pymoo.operators.selection.tournament import TournamentSelection
 
         return {**super()._arguments(m), "selection": TournamentSelection(func_comp=less_violated)}
 
-    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> NormalisedState:
-        m = self._presented_count(members.F.shape[1])
-        return NormalisedState(**common, ideal=np.full(m, np.inf), worst=np.full(m, -np.inf), extreme_points=np.empty((0, m)))
-
     def _best(self, algorithm: Any) -> Any:
         return algorithm.pop if self.whole else algorithm.opt
-
-    def _restore(self, algorithm: Any, state: NormalisedState, individuals: Any) -> None:
-        algorithm.pop = individuals
-        norm = algorithm.survival.norm
-        norm.ideal_point, norm.worst_point = state.ideal, state.worst
-        norm.extreme_points = state.extreme_points if len(state.extreme_points) else None
-
-    def _keep(self, algorithm: Any, state: NormalisedState, table: Members) -> None:
-        norm = algorithm.survival.norm
-        state.ideal, state.worst = norm.ideal_point, norm.worst_point
-        if norm.extreme_points is not None:
-            state.extreme_points = norm.extreme_points
 
 
 def less_violated(pop: Any, P: np.ndarray, random_state: np.random.Generator, **kwargs: Any) -> np.ndarray:
@@ -352,10 +329,11 @@ class GuidedState(State):
     """State of RVEA. All in objectives as presented to the algorithm."""
 
     SHAPES: ClassVar[dict[str, str]] = {"vectors": "k presented", "ideal": "presented", "nadir": "presented"}
+    CARRIED: ClassVar[dict[str, str]] = {"vectors": "survival.V", "ideal": "survival.ideal", "nadir": "survival.nadir"}
 
-    vectors: np.ndarray  # (k, m): Reference vectors of length 1, as they were last adapted
-    ideal: np.ndarray  # (m,): Best value of each objective so far among feasible points; infinite before the second generation
-    nadir: np.ndarray  # (m,): Worst value of each objective among the feasible members; infinite before the second generation
+    vectors: np.ndarray | None = None  # (k, m): Reference vectors of length 1, as they were last adapted
+    ideal: np.ndarray | None = None  # (m,): Best value of each objective so far among feasible points
+    nadir: np.ndarray | None = None  # (m,): Worst value of each objective among the feasible members
 
 
 @dataclass(frozen=True)
@@ -376,64 +354,44 @@ class RVEA(DirectedGenetic):
 
     Parameters
     ----------
-    population : int, optional
-        Number of individuals of the first population, and of offspring in a generation. Without `divisions`, also the number of reference
-        vectors, not less than that of objectives: a simplex lattice, if one has so many, and evenly spread otherwise. Default: the number
-        of vectors.
-    divisions : int, optional
-        Divisions of the simplex lattice (Das and Dennis 1998) of reference vectors. With `population`, there may be fewer vectors than
-        offspring, but at least half as many. Default: the finest lattice with at most 100 vectors (2 objectives: 100, 3: 91).
+    population, divisions
+        As for `NSGA3`; the directions are the reference vectors, and the population is that of the first generation.
     alpha : float, default 2
         Exponent of the progress in the factor, at least 0: with a larger one the angle counts later.
     adapt_every : float, default 0.1
         Fraction of the generations after which the vectors are adapted again, in (0, 1]; 1 is never.
     crossover, crossover_eta, mutation_eta, handling, penalty, degree
-        As for `NSGA3`.
-
-    Raises
-    ------
-    ValueError
-        If a setting is outside its range or, once the number of objectives is known, if population and vectors do not match.
+        As for `NSGA3`, errors included.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import RVEA
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = RVEA(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = RVEA(population=20).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 5
+    True
     """
 
     alpha: float = 2.0
     adapt_every: float = 0.1
 
     PYMOO = "rvea:RVEA"
+    STATE = GuidedState
 
     def _arguments(self, m: int) -> dict[str, Any]:
         return {**super()._arguments(m), "alpha": self.alpha, "adapt_freq": self.adapt_every}
 
-    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> GuidedState:
-        from pymoo.algorithms.moo.rvea import calc_V
-
-        m = self._presented_count(members.F.shape[1])
-        return GuidedState(**common, vectors=calc_V(self._directions(m)), ideal=np.full(m, np.inf), nadir=np.full(m, np.inf))
-
     def _restore(self, algorithm: Any, state: GuidedState, individuals: Any) -> None:
         from pymoo.algorithms.moo.rvea import calc_gamma
 
-        algorithm.pop, survival = individuals, algorithm.survival
+        super()._restore(algorithm, state, individuals)
         with np.errstate(invalid="ignore"):  # of vectors that are parallel but for rounding
-            survival.V, survival.gamma, survival.ideal = state.vectors, calc_gamma(state.vectors), state.ideal
-        survival.nadir = state.nadir if np.isfinite(state.nadir).all() else None
+            algorithm.survival.gamma = calc_gamma(algorithm.survival.V)
 
     def _keep(self, algorithm: Any, state: GuidedState, table: Members) -> None:
-        survival = algorithm.survival
-        state.ideal = survival.ideal
-        if survival.nadir is not None:
-            state.nadir = survival.nadir
-        if np.isfinite(survival.V).all():
-            state.vectors = survival.V
+        if not np.isfinite(algorithm.survival.V).all():
+            algorithm.survival.V = state.vectors
+        super()._keep(algorithm, state, table)
 
 
 @dataclass(repr=False)
@@ -441,9 +399,10 @@ class TwoArchiveState(State):
     """State of C-TAEA. The members are the archive that converges."""
 
     SHAPES: ClassVar[dict[str, str]] = {"ideal": "presented"}
+    CARRIED: ClassVar[dict[str, str]] = {"diversity": "da", "ideal": "survival.ideal_point"}
 
-    diversity: Members  # the other archive, in its order; none before the first population is presented to the algorithm
-    ideal: np.ndarray  # (m,): Best value of each objective so far, as presented to the algorithm; infinite before the first population
+    diversity: Members | None = None  # the other archive, in its order
+    ideal: np.ndarray | None = None  # (m,): Best value of each objective so far, as presented to the algorithm
 
 
 @dataclass(frozen=True)
@@ -458,50 +417,32 @@ class CTAEA(DirectedGenetic):
     ----------
     population : int, optional
         Number of individuals in each archive, of offspring in a generation and of reference directions; any number not less than that of
-        objectives. The directions are a simplex lattice, if one has so many, and evenly spread otherwise.
+        objectives.
     divisions : int, optional
-        Divisions of the simplex lattice (Das and Dennis 1998) of reference directions. Default: the finest lattice with at most 100
-        directions (2 objectives: 100, 3: 91).
-    crossover, crossover_eta, mutation_eta, handling, penalty, degree
         As for `NSGA3`.
-
-    Raises
-    ------
-    ValueError
-        If a setting is outside its range or, once the number of objectives is known, if population and divisions do not match.
+    crossover, crossover_eta, mutation_eta, handling, penalty, degree
+        As for `NSGA3`, errors included.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import CTAEA
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = CTAEA(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = CTAEA(population=20).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 5
+    True
     """
 
     PYMOO = "ctaea:CTAEA"
+    STATE = TwoArchiveState
     ONE_EACH = True
 
     def _arguments(self, m: int) -> dict[str, Any]:
         return {"ref_dirs": self._directions(m), **variation(self.crossover, self.crossover_eta, self.mutation_eta, n_offsprings=1)}
 
-    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> TwoArchiveState:
-        ideal = np.full(self._presented_count(members.F.shape[1]), np.inf)
-        return TwoArchiveState(**common, diversity=members.take(np.arange(0)), ideal=ideal)
-
-    def _table(self, state: TwoArchiveState) -> Members:
-        return state.members.joined(state.diversity)
-
     def _restore(self, algorithm: Any, state: TwoArchiveState, individuals: Any) -> None:
-        n, survival = len(state.members), algorithm.survival
-        algorithm.pop, algorithm.da = individuals[:n], individuals[n:]
-        survival.ideal_point = state.ideal
+        super()._restore(algorithm, state, individuals)
         # Only a budget of less than one population leaves fewer members. pymoo would look for them in the first n directions without end.
-        survival.ref_dirs = survival.ref_dirs[:n]
-
-    def _keep(self, algorithm: Any, state: TwoArchiveState, table: Members) -> None:
-        state.diversity, state.ideal = table.take(rows_of(algorithm.da)), algorithm.survival.ideal_point
+        algorithm.survival.ref_dirs = algorithm.survival.ref_dirs[: len(state.members)]
 
 
 @dataclass
@@ -509,8 +450,9 @@ class DecomposedState(State):
     """State of MOEA/D. Member i is the best for direction i."""
 
     SHAPES: ClassVar[dict[str, str]] = {"ideal": "presented"}
+    CARRIED: ClassVar[dict[str, str]] = {"ideal": "ideal"}
 
-    ideal: np.ndarray  # (m,): Best value of each objective so far, as presented to the algorithm
+    ideal: np.ndarray | None = None  # (m,): Best value of each objective so far, as presented to the algorithm
 
 
 @dataclass(frozen=True)
@@ -535,21 +477,15 @@ class MOEAD(Directed):
     crossover_eta, mutation_eta : float, default 20
         Distribution indices of simulated binary crossover and of polynomial mutation, in [1, 100].
     handling, penalty, degree
-        As for `NSGA3`.
-
-    Raises
-    ------
-    ValueError
-        If a setting is outside its range or, once the number of objectives is known, if population and divisions do not match.
+        As for `NSGA3`, errors included.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import MOEAD
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = MOEAD(population=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = MOEAD(population=20).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 1
+    True
     """
 
     neighbors: int = 20
@@ -559,6 +495,7 @@ class MOEAD(Directed):
     crossover_eta: float = 20.0
     mutation_eta: float = 20.0
 
+    STATE = DecomposedState
     COMPARES_VIOLATIONS = False
     ONE_EACH = True
 
@@ -589,15 +526,6 @@ class MOEAD(Directed):
         directions = self._directions(F.shape[1])[: len(F)]
         rows, places = pair_up(tchebycheff(F[:, None], directions, F.min(axis=0), F.max(axis=0)))
         return members.take(rows[np.argsort(places)])
-
-    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> DecomposedState:
-        return DecomposedState(**common, ideal=np.full(self._presented_count(members.F.shape[1]), np.inf))
-
-    def _restore(self, algorithm: Any, state: DecomposedState, individuals: Any) -> None:
-        algorithm.pop, algorithm.ideal = individuals, state.ideal
-
-    def _keep(self, algorithm: Any, state: DecomposedState, table: Members) -> None:
-        state.ideal = algorithm.ideal
 
     def _cut(self, algorithm: Any, count: int) -> None:
         if self.batch:

@@ -1,7 +1,6 @@
 """Constraint handling of the baselines: objectives and violations as they are presented to an algorithm.
 
-There are three ways, each a pure function, and one more for algorithms that only compare objectives. Only here does a violation or a
-failure become part of an objective; states and fronts keep the original values.
+Only here does a violation or a failure become part of an objective; states and fronts keep the original values.
 """
 
 from __future__ import annotations
@@ -24,44 +23,24 @@ def excess(F: np.ndarray, violation: np.ndarray, tolerance: float, degree: np.nd
     return np.where(failed, np.inf, np.where(violation <= tolerance, 0.0, violation if degree is None else degree))
 
 
-def problem_type(cv: np.ndarray) -> float:
-    """Type of a problem in Algorithm 1 of Chai and others (2020): 0 if no point is feasible, 1 if all are, 0.5 otherwise.
-
-    The algorithm only saves work by it: if no point is feasible, ranks by constrained dominance equal those by violation. `cv` (n,) is that
-    of `excess`.
-    """
-    feasible = cv == 0.0
-    return 1.0 if feasible.all() else 0.5 if feasible.any() else 0.0
-
-
-def feasible_first(F: np.ndarray, cv: np.ndarray) -> Presented:
-    """Superiority of feasible solutions (Deb 2000): feasible points are compared by objectives, infeasible ones by violation.
-
-    This is Definition 1 of Chai and others (2020) except for its third line: feasible points are compared by Pareto dominance, which does
-    not require every single objective to be better. F (n, m), cv (n,).
-    """
-    return _finite(F, cv), cv
-
-
-def penalty(F: np.ndarray, cv: np.ndarray, factor: float) -> Presented:
-    """Penalty function: `factor` times the violation is added to every objective. Arguments as for `feasible_first`."""
-    finite = np.isfinite(cv)
-    return _finite(F + factor * np.where(finite, cv, 0.0)[:, None], cv), np.where(finite, 0.0, cv)
-
-
-def objective(F: np.ndarray, cv: np.ndarray) -> Presented:
-    """Violation as an additional objective, the last one. Arguments as for `feasible_first`."""
-    return _finite(np.hstack([F, cv[:, None]]), cv), np.where(np.isfinite(cv), 0.0, cv)
-
-
 def presented(
     handling: str, factor: float, F: np.ndarray, violation: np.ndarray, tolerance: float, degree: np.ndarray | None = None
 ) -> Presented:
-    """Objectives and violations of points as presented to an algorithm with this `handling`; `degree` (n,) is by default the violation."""
+    """Objectives and violations of points as presented to an algorithm with this `handling`; `degree` (n,) is by default the violation.
+
+    "feasible-first": superiority of feasible solutions (Deb 2000), that is, feasible points are compared by objectives, infeasible ones by
+    violation. This is Definition 1 of Chai and others (2020) except for its third line: feasible points are compared by Pareto dominance,
+    which does not require every single objective to be better. "penalty": `factor` times the violation is added to every objective.
+    "objective": the violation is an additional objective, the last one.
+    """
     cv = excess(F, violation, tolerance, degree)
+    finite = np.isfinite(cv)
     if handling == "penalty":
-        return penalty(F, cv, factor)
-    return objective(F, cv) if handling == "objective" else feasible_first(F, cv)
+        F = F + factor * np.where(finite, cv, 0.0)[:, None]
+    elif handling == "objective":
+        F = np.hstack([F, cv[:, None]])
+    # What failed has a finite number, which is not used.
+    return np.where(finite[:, None], F, BEYOND_ALL), cv if handling == "feasible-first" else np.where(finite, 0.0, cv)
 
 
 def by_objectives(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
@@ -72,11 +51,6 @@ def by_objectives(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
     """
     share = np.divide(cv, 1.0 + cv, out=np.ones_like(cv), where=np.isfinite(cv))
     return np.where((cv > 0.0)[:, None], BEYOND_ALL * (1.0 + share)[:, None], F)
-
-
-def _finite(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
-    """F with a finite number, which is not used, where the evaluation failed."""
-    return np.where(np.isfinite(cv)[:, None], F, BEYOND_ALL)
 
 
 SUMS: dict[str, Callable[[np.ndarray], np.ndarray]] = {

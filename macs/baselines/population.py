@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,29 +17,38 @@ from ..solvers.solver import Solver
 from . import constraints
 
 
-@dataclass(repr=False)
+@dataclass(repr=False, kw_only=True)
 class State:
     """State of a solver with a population between two iterations. Each solver adds its own fields."""
+
+    CARRIED: ClassVar[dict[str, str]] = {}
+    """Fields that pymoo's algorithm has, too, and its attribute: `Members` or arrays, and None before the algorithm has them."""
 
     members: Members  # the population
     archive: Archive  # the present front: feasible, mutually non-dominated and different points
     closest: Archive  # the least violated point evaluated, one row, as long as the archive is empty; no row afterwards
-    iteration: int  # generations after the first population
+    iteration: int = 0  # generations after the first population
     # first_feasible, all_feasible: First generation with one feasible member, and with all members feasible; the first population is
     # generation 1. 0: none so far.
-    first_feasible: int
-    all_feasible: int
+    first_feasible: int = 0
+    all_feasible: int = 0
     rng: np.random.Generator
+
+    @classmethod
+    def of(cls, members: Members, rng: np.random.Generator, **more: Any) -> Self:
+        """The state of a first population; `more` are the solver's own fields."""
+        none = Archive.of(members, np.arange(0))
+        return cls(members=members, archive=none, closest=none, rng=rng, **more)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: generation {self.iteration + 1}; {self.members}, {self.archive}>"
 
     def note(self, tolerance: float) -> None:
-        """Update `first_feasible` and `all_feasible` by the population of this generation; see `constraints.problem_type`."""
-        kind = constraints.problem_type(constraints.excess(self.members.F, self.members.violation, tolerance))
-        if kind > 0.0 and not self.first_feasible:
+        """Update `first_feasible` and `all_feasible` by the population of this generation."""
+        feasible = constraints.excess(self.members.F, self.members.violation, tolerance) == 0.0
+        if feasible.any() and not self.first_feasible:
             self.first_feasible = self.iteration + 1
-        if kind == 1.0 and not self.all_feasible:
+        if feasible.all() and not self.all_feasible:
             self.all_feasible = self.iteration + 1
 
     def show(self, tolerance: float, seen: Members, *groups: Members) -> None:

@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from operator import attrgetter
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator
-from ..pareto.archive import Archive
 from ..pareto.directions import check_several
 from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
 
@@ -39,13 +38,14 @@ class Baseline(PopulationSolver):
     - Periodic variables are treated as plain intervals.
 
     An implementation is a frozen dataclass of settings, those of a `PopulationSolver` included, with the class of pymoo, its arguments, and
-    the hooks for what passes from one generation to the next beside the population.
+    a state that says what passes from one generation to the next beside the population, see `State.CARRIED`.
     """
 
     # The hooks
 
     PYMOO: ClassVar[str]
     """Module below `pymoo.algorithms.moo` and class of the algorithm."""
+    STATE: ClassVar[type[State]] = State
     SEVERAL: ClassVar[bool] = False
     """Whether it needs two or more objectives."""
 
@@ -67,20 +67,31 @@ class Baseline(PopulationSolver):
         module, _, kind = self.PYMOO.partition(":")
         return getattr(import_module(f"pymoo.algorithms.moo.{module}"), kind)(**self._arguments(m))
 
-    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> State:
-        """The state of the first population, before it is presented to the algorithm; `common` are the fields of all states."""
-        return State(**common)
+    def _first(self, members: Members, rng: np.random.Generator, evaluator: Evaluator) -> State:
+        """The state of the first population, before it is presented to the algorithm."""
+        return self.STATE.of(members, rng)
 
     def _restore(self, algorithm: Any, state: Any, individuals: Any) -> None:
-        """Restore the algorithm from the state; `individuals` are pymoo's individuals of `_table(state)`."""
-        algorithm.pop = individuals
+        """Restore the algorithm from the state; `individuals` are pymoo's individuals of `_table`."""
+        done = len(state.members)
+        algorithm.pop = individuals[:done]
+        for name, place in state.CARRIED.items():
+            value = getattr(state, name)
+            if isinstance(value, Members):
+                value, done = individuals[done : done + len(value)], done + len(value)
+            elif value is not None:
+                value = value.copy()
+            if value is not None:
+                owner, _, attribute = place.rpartition(".")
+                setattr(attrgetter(owner)(algorithm) if owner else algorithm, attribute, value)
 
     def _keep(self, algorithm: Any, state: Any, table: Members) -> None:
-        """Update the fields of the state that belong to this algorithm; its individuals know their rows in `table`."""
+        """Update the fields of the state that are carried; individuals know their rows in `table`."""
+        from pymoo.core.population import Population
 
-    def _table(self, state: Any) -> Members:
-        """All points of the state that become individuals, the population first."""
-        return state.members
+        for name, place in state.CARRIED.items():
+            value = attrgetter(place)(algorithm)
+            setattr(state, name, table.take(rows_of(value)) if isinstance(value, Population) else value)
 
     def _place(self, members: Members, evaluator: Evaluator) -> Members:
         """The first population, in a suitable order if points of a `start` are in it."""
@@ -96,9 +107,9 @@ class Baseline(PopulationSolver):
     # The contract
 
     @property
-    def makes_state(self) -> Callable[..., Any]:
-        """See `SearchMethod.makes_state`."""
-        return self._first
+    def state_class(self) -> type:
+        """See `SearchMethod.state_class`."""
+        return self.STATE
 
     def begin(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None = None) -> Any:
         """The state after a first population has been evaluated; see `SearchMethod.begin`."""
@@ -123,10 +134,8 @@ class Baseline(PopulationSolver):
         self.check_objectives(members.F.shape[1])
         if len(given):
             members = self._place(members, evaluator)
-        none = Archive.of(members, np.arange(0))
-        common = {"members": members, "archive": none, "closest": none, "iteration": 0, "first_feasible": 0, "all_feasible": 0, "rng": rng}
-        state = self._first(members, common, evaluator)
-        algorithm, table = self._set_up(evaluator, members.F.shape[1], rng, budget), self._table(state)
+        state = self._first(members, rng, evaluator)
+        algorithm, table = self._set_up(evaluator, members.F.shape[1], rng, budget), _table(state)
         individuals = self._individuals(table, evaluator)
         self._restore(algorithm, state, individuals)
         with warnings.catch_warnings(), np.errstate(divide="ignore", invalid="ignore"):  # pymoo changes the filters
@@ -140,7 +149,7 @@ class Baseline(PopulationSolver):
         left = budget - evaluator.counts.evaluations
         if left <= 0:
             return
-        table = self._table(state)
+        table = _table(state)
         algorithm = self._set_up(evaluator, table.F.shape[1], state.rng, budget)
         self._restore(algorithm, state, self._individuals(table, evaluator))
         generation = state.iteration + 2  # pymoo's number: the first population is 1
@@ -208,6 +217,15 @@ class Baseline(PopulationSolver):
         state.members = table.take(rows_of(algorithm.pop))
         self._keep(algorithm, state, table)
         state.show(evaluator.tolerance, seen, table.take(rows_of(self._best(algorithm))), state.members)
+
+
+def _table(state: State) -> Members:
+    """All points of the state that become individuals, the population first."""
+    table = state.members
+    for name in state.CARRIED:
+        value = getattr(state, name)
+        table = table.joined(value) if isinstance(value, Members) else table
+    return table
 
 
 def rows_of(individuals: Any) -> np.ndarray:

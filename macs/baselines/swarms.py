@@ -9,11 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..evaluation.evaluator import Evaluator, UnitBox
-from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
 from .constraints import excess
 from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
-from .pymoo_adapter import Baseline, rows_of
+from .pymoo_adapter import Baseline
 
 SETTLING = 20
 """Iterations over which the mean of the front is compared, for `settled`."""
@@ -75,21 +74,15 @@ class MOPSO(PopulationSolver):
         The search ends when the mean of the front is, in each objective, within this part of what it was after each of the last 20
         iterations; `stats["stopped"]` is then "settled". 0: the budget is spent.
     handling, penalty, degree
-        As for `NSGA2`. With "penalty" and "objective", the first swarm is used as it is drawn.
-
-    Raises
-    ------
-    ValueError
-        If a setting is outside its range; the message names it.
+        As for `NSGA2`, errors included. With "penalty" and "objective", the first swarm is used as it is drawn.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import MOPSO
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = MOPSO(particles=20, archive=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = MOPSO(particles=20, archive=20).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 5
+    True
     """
 
     particles: int = 100
@@ -122,14 +115,9 @@ class MOPSO(PopulationSolver):
         evaluator.check_budget(budget)
         Z = self._candidates(evaluator, thinned(distinct(start), self.particles), self.particles, rng)
         swarm = evaluate(evaluator, Z[: budget - evaluator.counts.evaluations], self.degree)
-        state = ParticleState(
-            members=swarm,
-            archive=Archive.of(swarm, np.arange(0)),
-            closest=Archive.of(swarm, np.arange(0)),
-            iteration=0,
-            first_feasible=0,
-            all_feasible=0,
-            rng=rng,
+        state = ParticleState.of(
+            swarm,
+            rng,
             best=swarm,
             leaders=swarm.take(np.arange(0)),
             velocity=np.zeros((len(swarm), len(evaluator.free))),
@@ -221,10 +209,11 @@ class SwarmState(State):
     """State of MOPSO-CD. The members are the particles, in their order."""
 
     SHAPES: ClassVar[dict[str, str]] = {"velocity": "n d"}
+    CARRIED: ClassVar[dict[str, str]] = {"best": "pbest", "leaders": "archive", "velocity": "velocities"}
 
-    best: Members  # best position of each particle
-    leaders: Members  # archive of the algorithm, in its order, from which leaders are drawn
-    velocity: np.ndarray  # (n, d): In the user's units
+    best: Members | None = None  # best position of each particle
+    leaders: Members | None = None  # archive of the algorithm, in its order, from which leaders are drawn
+    velocity: np.ndarray | None = None  # (n, d): In the user's units
 
 
 @dataclass(frozen=True)
@@ -251,21 +240,15 @@ class MOPSOCD(Baseline):
     max_velocity : float, default 0.5
         Largest step in a variable, in spans of it, in (0, 1].
     handling, penalty, degree
-        As for `NSGA2`.
-
-    Raises
-    ------
-    ValueError
-        If a setting is outside its range; the message names it.
+        As for `NSGA2`, errors included.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from macs import MOPSOCD
-    >>> schaffer = lambda X: np.hstack([X**2, (X - 2) ** 2])
-    >>> front = MOPSOCD(particles=20, archive=20).minimize(schaffer, [(-10, 10)], evaluations=200, seed=1)
-    >>> front.objectives.shape[1]
-    2
+    >>> from problems import load
+    >>> front = MOPSOCD(particles=20, archive=20).solve(load("four_bar_truss"), evaluations=200, seed=1)
+    >>> len(front) > 5
+    True
     """
 
     particles: int = 100
@@ -276,6 +259,7 @@ class MOPSOCD(Baseline):
     max_velocity: float = 0.5
 
     PYMOO = "mopso_cd:MOPSO_CD"
+    STATE = SwarmState
     RANGES: ClassVar[Mapping[str, int | str]] = {**Baseline.RANGES, "particles": 2}
     COMPARES_VIOLATIONS = False
 
@@ -295,25 +279,15 @@ class MOPSOCD(Baseline):
         largest = self.max_velocity * (evaluator.upper - evaluator.lower)
         return rng.uniform(-largest, largest, (count, len(largest)))
 
-    def _first(self, members: Members, common: dict[str, Any], evaluator: Evaluator) -> SwarmState:
-        velocity = self._velocity(evaluator, self.particles, common["rng"])
-        return SwarmState(**common, best=members, leaders=members.take(np.arange(0)), velocity=velocity)
-
-    def _table(self, state: SwarmState) -> Members:
-        return state.members.joined(state.best).joined(state.leaders)
+    def _first(self, members: Members, rng: np.random.Generator, evaluator: Evaluator) -> State:
+        return SwarmState.of(members, rng, best=members, velocity=self._velocity(evaluator, self.particles, rng))
 
     def _restore(self, algorithm: Any, state: SwarmState, individuals: Any) -> None:
         from pymoo.util.archive import MultiObjectiveArchive
 
-        n = len(state.members)
-        algorithm.pop, algorithm.pbest, leaders = individuals[:n], individuals[n : 2 * n], individuals[2 * n :]
+        super()._restore(algorithm, state, individuals)
         algorithm.pbest_f = algorithm.pbest.get("F")
-        algorithm.archive = MultiObjectiveArchive(individuals=leaders, max_size=self.archive)
-        algorithm.velocities = state.velocity.copy()
-
-    def _keep(self, algorithm: Any, state: SwarmState, table: Members) -> None:
-        state.best, state.leaders = table.take(rows_of(algorithm.pbest)), table.take(rows_of(algorithm.archive))
-        state.velocity = algorithm.velocities
+        algorithm.archive = MultiObjectiveArchive(individuals=algorithm.archive, max_size=self.archive)
 
 
 def _keep_out(algorithm: Any) -> None:

@@ -16,11 +16,11 @@ import stat
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import Any, get_type_hints
+from typing import Any
 
 import numpy as np
 
@@ -88,7 +88,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         self, path: str | PathLike[str], solver: SearchMethod, belongs: Mapping[str, Any], sizes: Mapping[str, int] | None = None
     ) -> None:
         self.path, self.failure = path, ""
-        self._state_class, self._solver = _state_class(solver), type(solver).__name__
+        self._state_class, self._solver = solver.state_class, type(solver).__name__
         self._belongs = _read_json(document(dict(belongs)))
         self._versions = [versions()]
         self._sizes = sizes or {}
@@ -183,21 +183,10 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
 def keeps(solver: SearchMethod) -> bool:
     """Whether a checkpoint can save a run of this solver: whether the class of its state is known."""
     try:
-        _state_class(solver)
+        solver.state_class  # noqa: B018 - it raises
     except ValueError:
         return False
     return True
-
-
-def _state_class(solver: SearchMethod) -> type:
-    name = type(solver).__name__
-    try:
-        found = get_type_hints(solver.makes_state).get("return")
-    except NameError as error:
-        raise ValueError(f"checkpoint: what {name}.{solver.makes_state.__name__} returns is not known at run time: {error}") from error
-    if not (isinstance(found, type) and is_dataclass(found)):
-        raise ValueError(f"checkpoint: {name}.{solver.makes_state.__name__} is not annotated with the class of the state that it returns")
-    return found
 
 
 def _check_counts(status: RunStatus) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, is_dataclass
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class SearchMethod(ABC):
 
     A checkpoint keeps the state, so that a run can continue to the same bits. For that:
 
-    - The state is a dataclass, of the class in the return annotation of `begin` (or of the method that `makes_state` returns).
+    - The state is a dataclass, of the class in the return annotation of `begin`, or of another `state_class`.
     - Its fields are numpy arrays (of numbers, bool or str), int, float, bool, str, None, numpy.random.Generator, dataclasses of these, and
       lists, tuples, dicts (`dict[str, ...]`) or Counters of these. They are annotated in full, with names that exist at run time. `X |
       None` is allowed; other unions and `Any` are not.
@@ -83,9 +83,16 @@ class SearchMethod(ABC):
         return {}
 
     @property
-    def makes_state(self) -> Callable[..., Any]:
-        """The method whose return annotation is the class of the state, for checkpoints."""
-        return self.begin
+    def state_class(self) -> type:
+        """The class of the state, for checkpoints. Raises ValueError if the annotation of `begin` does not say it."""
+        name = type(self).__name__
+        try:
+            found = get_type_hints(self.begin).get("return")
+        except NameError as error:
+            raise ValueError(f"checkpoint: what {name}.begin returns is not known at run time: {error}") from error
+        if not (isinstance(found, type) and is_dataclass(found)):
+            raise ValueError(f"checkpoint: {name}.begin is not annotated with the class of the state that it returns")
+        return found
 
     @property
     def certifies(self) -> bool:

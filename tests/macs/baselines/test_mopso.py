@@ -75,19 +75,12 @@ def test_thinning_levels_what_there_is(numbers, limit, seed) -> None:
 
 
 def test_velocities_by_hand() -> None:
+    """The sign that eq. (22) is printed with would drive particles away from what they follow."""
     X, V, best, leader = (np.array([row]) for row in ([0.5, 0.5], [0.1, -0.1], [0.7, 0.5], [0.5, 0.1]))
     chance = np.array([[[0.5, 1.0]], [[1.0, 0.5]]])
     found = velocities(PLAIN, X, V, best, leader, weights=(0.5, 2.0, 2.0), chance=chance, largest=1.0)
     assert found == pytest.approx(np.array([[0.05 + 2 * 0.5 * 0.2, -0.05 + 2 * 0.5 * -0.4]]))
     assert np.abs(velocities(PLAIN, X, V, best, leader, weights=(0.5, 2.0, 2.0), chance=chance, largest=0.1)).max() == 0.1
-
-
-def test_particles_are_drawn_to_what_they_follow() -> None:
-    """The sign that eq. (22) is printed with would drive them away."""
-    rng = np.random.default_rng(0)
-    X, target = rng.random((50, 2)), np.full((50, 2), 0.5)
-    V = velocities(PLAIN, X, np.zeros((50, 2)), target, target, weights=(0.7, 1, 1), chance=np.full((2, 50, 2), 0.3), largest=1.0)
-    assert (np.linalg.norm(X + V - 0.5, axis=1) < np.linalg.norm(X - 0.5, axis=1)).all()
 
 
 def test_bounds_stop_and_turn_particles_and_periods_let_them_through() -> None:

@@ -21,9 +21,9 @@ def spheres(X: np.ndarray) -> np.ndarray:
     return np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1)
 
 
-def last(settings: Any, function: Any, budget: int, bounds: Any = CUBE, **labels: Any) -> Any:
+def last(settings: Any, function: Any, budget: int, bounds: Any = CUBE) -> Any:
     """The state after the budget is spent."""
-    box = boxed(function, bounds, **labels)
+    box = boxed(function, bounds)
     state = settings.begin(box, budget, np.random.default_rng(1))
     while box.counts.evaluations < budget:
         settings.advance(state, box, budget)

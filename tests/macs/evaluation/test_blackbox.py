@@ -121,6 +121,15 @@ def test_failed_rows_constraints_and_senses():
     assert box.counts.failures == {"failed": 1, "infeasible": 1}
 
 
+def test_violations_of_a_function_are_its_columns():
+    def function(X):
+        return X, np.stack([X[:, 0] - 1, 1 - X[:, 0]], axis=1)
+
+    seen = boxed(function, [(0, 4)] * 2, constraints=lambda X: X[:, 1] - 2).evaluate(np.array([[3.0, 1.0], [0.5, 4.0]]))
+    assert seen.violations.tolist() == [[2, 0, 0], [0, 0.5, 2]] and seen.violation.tolist() == [2, 2]
+    assert boxed(lambda X: X, [(0, 1)] * 2).evaluate(np.zeros((3, 2))).violations.shape == (3, 0)
+
+
 def test_one_objective_may_come_as_a_vector_and_the_function_may_not_change_its_points():
     def function(X):
         X *= 2

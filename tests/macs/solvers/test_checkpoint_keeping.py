@@ -7,7 +7,6 @@ import logging
 import math
 import tracemalloc
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -19,6 +18,7 @@ import pytest
 from macs.evaluation.evaluator import Counts
 from macs.solvers import checkpoint
 from macs.solvers.checkpoint import WRITE_SECONDS, WRITE_SHARE, Checkpoint, RunStatus, Unreadable, keeps
+from macs.solvers.method import SearchMethod
 from macs.solvers.packing import encode
 
 
@@ -38,15 +38,14 @@ class State:
     step: int
 
 
-class Walk:
+class Walk(SearchMethod):
     """A solver of which a checkpoint needs no more."""
 
-    def begin(self) -> State:
+    def begin(self, *given: Any) -> State:
         raise NotImplementedError
 
-    @property
-    def makes_state(self) -> Callable[..., Any]:
-        return self.begin
+    def advance(self, *given: Any) -> None:
+        raise NotImplementedError
 
 
 def rows(count: int, m: int = 2, d: int = 3) -> Rows:
@@ -69,8 +68,8 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "run.ckpt"
 
 
-def made(path: Path, belongs: dict[str, Any] | None = None, sizes: dict[str, int] | None = None) -> Checkpoint:
-    return Checkpoint(path, Walk(), BELONGS if belongs is None else belongs, sizes)  # type: ignore[arg-type]
+def made(path: Path, belongs: dict[str, Any] | None = None) -> Checkpoint:
+    return Checkpoint(path, Walk(), BELONGS if belongs is None else belongs)
 
 
 def written(path: Path, what: State | None = None, how: RunStatus | None = None, belongs: dict[str, Any] | None = None) -> Checkpoint:
@@ -81,12 +80,23 @@ def written(path: Path, what: State | None = None, how: RunStatus | None = None,
     return one
 
 
-def forged(path: Path, change: Callable[[dict[str, Any], dict[str, Any]], Any]) -> None:
-    """A file with another content and a valid checksum: `change` is given its document and its state as plain data."""
+REMOVED = object()
+
+
+def forged(path: Path, place: str, value: Any) -> None:
+    """A file with a valid checksum in which one part, of the document or of its "state", is another, or `REMOVED`."""
     document = msgspec.msgpack.decode(checkpoint.read_file(path))
-    state = msgspec.msgpack.decode(document["state"])
-    change(document, state)
-    path.write_bytes(checkpoint.sealed(msgspec.msgpack.encode(document | {"state": msgspec.msgpack.encode(state)})))
+    document["state"] = msgspec.msgpack.decode(document["state"])
+    *parts, last = place.split(".")
+    part = document
+    for name in parts:
+        part = part[name]
+    if value is REMOVED:
+        del part[last]
+    else:
+        part[last] = value
+    document["state"] = msgspec.msgpack.encode(document["state"])
+    path.write_bytes(checkpoint.sealed(msgspec.msgpack.encode(document)))
 
 
 def plain(array: np.ndarray) -> dict[str, Any]:
@@ -261,74 +271,51 @@ def test_another_run_is_refused_with_what_differs_and_what_to_do(path: Path, bel
 # Files that were forged
 
 
-def counts(document: dict[str, Any], **changes: Any) -> None:
-    document["counts"].update(changes)
+ZEROS = plain(np.zeros((4, 3)))
+DOCUMENT, STATE = "is no valid checkpoint: ", "cannot be continued by this Walk: "
+FORGED: list[tuple[str, Any, str, str]] = [
+    ("belongs", '{"seed": -1}', DOCUMENT, "seed is -1, a number of at least"),
+    ("belongs", "cake", DOCUMENT, "Expecting value"),
+    ("idle", -2, DOCUMENT, "idle is -2, a number"),
+    ("idle", 1.5, DOCUMENT, "Expected `int`, got `float` - at `$.id"),
+    ("elapsed", math.inf, DOCUMENT, "elapsed is inf, a number"),
+    ("elapsed", math.nan, DOCUMENT, "elapsed is nan, a number"),
+    ("counts.evaluations", -5, DOCUMENT, "counts.evaluations is -5"),
+    ("counts.failures", {"failed": -1}, DOCUMENT, "counts.failures['failed'] is"),
+    ("versions", [{"numpy": 3}], DOCUMENT, "Expected `str`, got `int`"),
+    ("versions", REMOVED, DOCUMENT, "Object missing required field `versions`"),
+    ("state.step", REMOVED, STATE, "Object missing required field `step`"),
+    ("state.archive.Z", 3, STATE, "no array: "),
+    ("state.archive.Z", ZEROS | {"dtype": "|O"}, STATE, "no array: "),
+    (
+        "state.archive.Z",
+        ZEROS | {"shape": [10**9, 10**9]},
+        STATE,
+        "no array: 96 bytes are no array (1000000000, 1000000000) of float64 - at `$.archive.Z`",
+    ),
+    ("state.archive.Z", ZEROS | {"shape": [-4, -3]}, STATE, "no array: "),
+    ("state.archive.Z", {"dtype": "<U0", "shape": [10**15], "order": "C", "content": b""}, STATE, "no array: "),
+    (
+        "state.archive.Z",
+        plain(np.zeros((4, 3), np.float32)),
+        STATE,
+        "state.archive.Z is an array of float32 with 2 dimensions; float64 with 2 expected",
+    ),
+    ("state.closest.violation", plain(np.zeros((1, 1))), STATE, "state.closest.violation is an array of float64"),
+    ("state.closest.F", plain(np.zeros((2, 2))), STATE, "state.closest.F has 2 rows, 1 expected"),
+    ("state.closest.F", plain(np.zeros((1, 3))), STATE, "state.closest.F has 3 columns, 2 expected"),
+    ("state.archive.F", plain(np.full((4, 2), np.nan)), STATE, "state.archive has a value that is not finite"),
+]
 
 
-FORGED: dict[str, tuple[Callable[[dict[str, Any], dict[str, Any]], Any], str]] = {
-    "seed": (lambda document, state: document.update(belongs='{"seed": -1}'), "is no valid checkpoint: seed is -1, a number of at least"),
-    "no JSON": (lambda document, state: document.update(belongs="cake"), "is no valid checkpoint: Expecting value"),
-    "idle": (lambda document, state: document.update(idle=-2), "is no valid checkpoint: idle is -2, a number"),
-    "endless": (lambda document, state: document.update(elapsed=math.inf), "is no valid checkpoint: elapsed is inf, a number"),
-    "no number": (lambda document, state: document.update(elapsed=math.nan), "is no valid checkpoint: elapsed is nan, a number"),
-    "evaluations": (lambda document, state: counts(document, evaluations=-5), "is no valid checkpoint: counts.evaluations is -5"),
-    "failures": (lambda document, state: counts(document, failures={"failed": -1}), "is no valid checkpoint: counts.failures['failed'] is"),
-    "part of a number": (
-        lambda document, state: document.update(idle=1.5),
-        "is no valid checkpoint: Expected `int`, got `float` - at `$.id",
-    ),
-    "version": (lambda document, state: document.update(versions=[{"numpy": 3}]), "is no valid checkpoint: Expected `str`, got `int`"),
-    "part": (lambda document, state: document.pop("versions"), "is no valid checkpoint: Object missing required field `versions`"),
-    "field": (lambda document, state: state.pop("step"), "cannot be continued by this Walk: Object missing required field `step`"),
-    "no array": (lambda document, state: state["archive"].update(Z=3), "cannot be continued by this Walk: no array: "),
-    "objects": (
-        lambda document, state: state["archive"].update(Z=plain(np.zeros((4, 3))) | {"dtype": "|O"}),
-        "cannot be continued by this Walk: no array: ",
-    ),
-    "shape": (
-        lambda document, state: state["archive"].update(Z=plain(np.zeros((4, 3))) | {"shape": [10**9, 10**9]}),
-        "cannot be continued by this Walk: no array: 96 bytes are no array (1000000000, 1000000000) of float64 - at `$.archive.Z`",
-    ),
-    "negative shape": (
-        lambda document, state: state["archive"].update(Z=plain(np.zeros((4, 3))) | {"shape": [-4, -3]}),
-        "cannot be continued by this Walk: no array: ",
-    ),
-    "no bytes": (
-        lambda document, state: state["archive"].update(Z={"dtype": "<U0", "shape": [10**15], "order": "C", "content": b""}),
-        "cannot be continued by this Walk: no array: ",
-    ),
-    "type": (
-        lambda document, state: state["archive"].update(Z=plain(np.zeros((4, 3), np.float32))),
-        "cannot be continued by this Walk: state.archive.Z is an array of float32 with 2 dimensions; float64 with 2 expected",
-    ),
-    "rank": (
-        lambda document, state: state["closest"].update(violation=plain(np.zeros((1, 1)))),
-        "cannot be continued by this Walk: state.closest.violation is an array of float64 with 2 dimensions; float64 with 1 expected",
-    ),
-    "rows": (
-        lambda document, state: state["closest"].update(F=plain(np.zeros((2, 2)))),
-        "cannot be continued by this Walk: state.closest.F has 2 rows, 1 expected",
-    ),
-    "objectives": (
-        lambda document, state: state["closest"].update(F=plain(np.zeros((1, 3)))),
-        "cannot be continued by this Walk: state.closest.F has 3 columns, 2 expected",
-    ),
-    "NaN": (
-        lambda document, state: state["archive"].update(F=plain(np.full((4, 2), np.nan))),
-        "cannot be continued by this Walk: state.archive has a value that is not finite",
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", FORGED)
-def test_what_no_run_can_have_is_refused_by_the_name_of_the_field(path: Path, kind: str) -> None:
-    change, words = FORGED[kind]
+@pytest.mark.parametrize(("place", "value", "what", "words"), FORGED)
+def test_what_no_run_can_have_is_refused_by_the_name_of_the_field(path: Path, place: str, value: Any, what: str, words: str) -> None:
     written(path)
-    forged(path, change)
+    forged(path, place, value)
     content = path.read_bytes()
     with pytest.raises(Unreadable) as caught:
         made(path).read(3)
-    assert str(caught.value).startswith(f"'{path}' {words}")
+    assert str(caught.value).startswith(f"'{path}' {what}{words}")
     assert "; it was left as it is; " in str(caught.value) and path.read_bytes() == content
 
 
@@ -355,23 +342,19 @@ def test_what_was_never_evaluated_may_be_infinite(path: Path) -> None:
 # States that break the contract
 
 
-BROKEN: dict[str, tuple[Callable[[], tuple[Any, RunStatus]], str]] = {
-    "column": (lambda: (replace(state(), closest=rows(1, m=3)), kept()), "^state.closest.F has 3 columns, 2 expected$"),
-    "rows": (
-        lambda: (replace(state(), archive=replace(rows(4), violation=np.zeros(3))), kept()),
-        "^state.archive.F has 4 rows, 3 exp|viol",
-    ),
-    "field": (lambda: (replace(state(), step=1.5), kept()), "Expected `int`, got `float` - at `\\$.step`"),  # type: ignore[arg-type]
-    "no data": (lambda: (replace(state(), step=object()), kept()), "^object cannot be kept in a checkpoint$"),  # type: ignore[arg-type]
-}
-
-
-@pytest.mark.parametrize("kind", BROKEN)
-def test_a_state_that_breaks_the_contract_is_refused_when_it_is_noted(path: Path, kind: str) -> None:
-    make, words = BROKEN[kind]
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"closest": rows(1, m=3)}, "^state.closest.F has 3 columns, 2 expected$"),
+        ({"archive": replace(rows(4), violation=np.zeros(3))}, "^state.archive.F has 4 rows, 3 exp|viol"),
+        ({"step": 1.5}, "Expected `int`, got `float` - at `\\$.step`"),
+        ({"step": object()}, "^object cannot be kept in a checkpoint$"),
+    ],
+)
+def test_a_state_that_breaks_the_contract_is_refused_when_it_is_noted(path: Path, changes: dict[str, Any], words: str) -> None:
     one = made(path)
     with pytest.raises(TypeError, match=words):
-        one.keep(*make())
+        one.keep(replace(state(), **changes), kept())
     one.write()
     assert not path.exists()
 
@@ -388,7 +371,7 @@ class ShapedState:
 
 
 class ShapedWalk(Walk):
-    def begin(self) -> ShapedState:  # type: ignore[override]
+    def begin(self, *given: Any) -> ShapedState:  # type: ignore[override]
         raise NotImplementedError
 
 
@@ -396,21 +379,19 @@ class ShapedWalk(Walk):
     ("sizes", "words"), [({}, ""), ({"m": 2, "d": 3}, ""), ({"m": 3}, "F has 2 columns, 3"), ({"d": 4}, "Z has 3 col")]
 )
 def test_the_sizes_of_the_run_are_those_of_its_state(path: Path, sizes: dict[str, int], words: str) -> None:
-    def of(count: int) -> Shaped:
-        return Shaped(**vars(rows(count)))
-
-    one = Checkpoint(path, ShapedWalk(), {}, sizes)  # type: ignore[arg-type]
+    what = ShapedState(Shaped(**vars(rows(4))), Shaped(**vars(rows(1))))
+    one = Checkpoint(path, ShapedWalk(), {}, sizes)
     if words:
         with pytest.raises(TypeError, match=f"^state.archive.{words}"):
-            one.keep(ShapedState(of(4), of(1)), kept())
+            one.keep(what, kept())
         # Nor is a file of other sizes gone on from.
-        unchecked = Checkpoint(path, ShapedWalk(), {})  # type: ignore[arg-type]
-        unchecked.keep(ShapedState(of(4), of(1)), kept())
+        unchecked = Checkpoint(path, ShapedWalk(), {})
+        unchecked.keep(what, kept())
         unchecked.write()
         with pytest.raises(Unreadable, match=f"cannot be continued by this ShapedWalk: state.archive.{words}"):
             one.read(3)
     else:
-        one.keep(ShapedState(of(4), of(1)), kept())
+        one.keep(what, kept())
         one.write()
         assert one.read(3) is not None
 
@@ -419,22 +400,17 @@ def test_the_sizes_of_the_run_are_those_of_its_state(path: Path, sizes: dict[str
 
 
 class Silent(Walk):
-    def begin(self):  # type: ignore[no-untyped-def]
+    def begin(self, *given: Any):  # type: ignore[no-untyped-def]
         raise NotImplementedError
 
 
 class Vague(Walk):
-    def begin(self) -> dict[str, float]:  # type: ignore[override]
-        raise NotImplementedError
-
-
-class Bare(Walk):
-    def begin(self) -> dict:  # type: ignore[override,type-arg]
+    def begin(self, *given: Any) -> dict[str, float]:  # type: ignore[override]
         raise NotImplementedError
 
 
 class Lost(Walk):
-    def begin(self) -> Nowhere:  # type: ignore[name-defined]  # noqa: F821
+    def begin(self, *given: Any) -> Nowhere:  # type: ignore[name-defined]  # noqa: F821
         raise NotImplementedError
 
 
@@ -443,11 +419,10 @@ class Lost(Walk):
     [
         (Silent, "^checkpoint: Silent.begin is not annotated with the class of the state that it returns$"),
         (Vague, "^checkpoint: Vague.begin is not annotated with the class of the state that it returns$"),
-        (Bare, "^checkpoint: Bare.begin is not annotated with the class of the state that it returns$"),
         (Lost, "^checkpoint: what Lost.begin returns is not known at run time: name 'Nowhere' is not defined$"),
     ],
 )
 def test_a_solver_that_does_not_say_what_its_state_is_is_not_kept(path: Path, solver: type[Walk], words: str) -> None:
-    assert keeps(Walk()) and not keeps(solver())  # type: ignore[arg-type]
+    assert keeps(Walk()) and not keeps(solver())
     with pytest.raises(ValueError, match=words):
-        Checkpoint(path, solver(), {})  # type: ignore[arg-type]
+        Checkpoint(path, solver(), {})

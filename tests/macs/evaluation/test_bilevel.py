@@ -1,0 +1,97 @@
+"""Trajectories as a search evaluates them: each constraint's violation, and work, which evaluations and gradient solves count alike:
+iterations of IPOPT times variables of its program."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from macs import MACS
+from macs.evaluation.bilevel import Bilevel
+from macs.evaluation.evaluator import Evaluation
+from macs.fronts.provenance import merged_stats, more_costs
+from problems import Problem, load
+from transcription import DFET, InnerResult, InnerSolver
+from transcription.inner import Ipopt, Newton, Propagate, inner_solver
+from transcription.inner.base import newton_work, propagation_work
+
+METHOD = DFET(3, 3)
+
+
+def evaluated(inner, problem: str = "goddard") -> tuple[Bilevel, int, Evaluation]:
+    """An evaluator after a batch of four random candidates, its number of variables, and the batch."""
+    evaluator = Bilevel(METHOD.nlp(load(problem)), inner, 1e-6)
+    rng = np.random.default_rng(1)
+    candidates = evaluator.lower + rng.random((4, len(evaluator.free))) * (evaluator.upper - evaluator.lower)
+    return evaluator, len(evaluator.nlp.variables), evaluator.evaluate(evaluator.first_guess(candidates))
+
+
+@pytest.mark.parametrize(("inner", "part"), [(Ipopt(), lambda nlp: 1.0), (Newton(), newton_work), (Propagate(), propagation_work)])
+def test_iterations_count_by_what_they_take(inner, part):
+    evaluator, n, _ = evaluated(inner)
+    each = part(evaluator.nlp)
+    assert evaluator.counts.inner_iterations >= 4 and evaluator.counts.work == round(each * n * evaluator.counts.inner_iterations)
+
+
+def test_less_is_taken_without_derivatives():
+    nlp = METHOD.nlp(load("goddard"))
+    assert 0.0 < propagation_work(nlp) < newton_work(nlp) < 1.0
+
+
+def test_what_goes_to_ipopt_counts_more(monkeypatch):
+    """Newton's method gives up after one iteration, so that IPOPT does the rest."""
+    solve = Newton.solve
+    monkeypatch.setattr(Newton, "solve", lambda self, *given, **more: solve(Newton(max_iterations=1), *given, **more))
+    evaluator, n, _ = evaluated(inner_solver("auto"))
+    counts = evaluator.counts
+    light = newton_work(evaluator.nlp)
+    assert counts.fallbacks == 4 and counts.work == round(n * (counts.inner_iterations - (1.0 - light) * 4))
+
+
+def test_gradient_solves_count_all_their_iterations():
+    evaluator, n, _ = evaluated(Newton())
+    before, iterations = evaluator.counts.work, evaluator.counts.inner_iterations
+    start = evaluator.first_guess(0.5 * (evaluator.lower + evaluator.upper)[None])
+    evaluator.descend(start, np.zeros((1, 2)), np.ones((1, 2)))
+    assert evaluator.counts.work - before == n * (evaluator.counts.inner_iterations - iterations) > 0
+
+
+@pytest.mark.slow
+def test_fronts_say_it_and_add_it_up():
+    front = MACS(agents=4, archive=4, mesh="fixed").solve(load("goddard"), METHOD, evaluations=60, seed=1, verify=None)
+    work = front.stats["work"]
+    assert work > 0 and merged_stats([front.stats, front.stats])["work"] == 2 * work
+    evaluator, _, _ = evaluated(Newton())
+    assert more_costs(front.stats, evaluator.counts, 0.0, "")["work"] == work + evaluator.counts.work
+    without = {name: value for name, value in front.stats.items() if name != "work"}
+    assert merged_stats([without])["work"] == 0, "files from before it was counted"
+
+
+class Foreign(InnerSolver):
+    """An inner solver with nothing beyond the contract."""
+
+    def solve(self, nlp, candidates, warm=None, *, tolerance=1e-6) -> InnerResult:
+        found = inner_solver("propagate").solve(nlp, candidates, warm, tolerance=tolerance)
+        return InnerResult(found.z, found.F, found.violation, found.status, found.moved, found.iterations)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("inner", ["propagate", "auto", Foreign()], ids=["propagate", "auto", "own"])
+def test_violations_are_what_a_point_tells(inner):
+    evaluator, _, seen = evaluated(inner_solver(inner), "orbit_rise")
+    nlp = evaluator.nlp
+    assert seen.violations.max(axis=1) == pytest.approx(seen.violation, abs=1e-15)
+    for z, row in zip(seen.Z, seen.violations, strict=True):
+        assert dict(zip(nlp.constraints, row.tolist(), strict=True)) == nlp.violations(z)
+
+
+def test_a_peak_without_bounds_is_no_violation():
+    problem = Problem("peak")
+    phase = problem.phase("slide", t0=0, tf=1)
+    x, u = phase.state("x", bounds=(-2, 2), initial=0), phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=u)
+    problem.minimize("peak", phase.peak(x))
+    problem.minimize("effort", phase.integral(u**2))
+    nlp = DFET(2, 2).transcribe(problem)
+    z = nlp.propagate(nlp.first_guess(np.zeros((1, len(nlp.free)))))[0]
+    assert max(nlp.violations(z).values()) <= 1e-9
