@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, Self
 
@@ -14,7 +14,19 @@ from ..evaluation.evaluator import Evaluator
 from ..pareto.archive import Archive, least_violated
 from ..pareto.dominance import nondominated
 from ..solvers.solver import Solver
-from . import constraints
+
+HANDLINGS = ("feasible-first", "penalty", "objective")
+BEYOND_ALL = 1e30
+"""Larger than any objective; its square is still finite."""
+Presented = tuple[np.ndarray, np.ndarray]
+"""Finite objectives (n, m), and violations (n,): 0 for a point that counts as feasible, infinite if the evaluation failed."""
+SUMS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "sum": lambda v: v.sum(axis=1),  # eq. (18) with eq. (16) without its upper bound
+    "log": lambda v: np.log1p(v).sum(axis=1),
+    "printed": lambda v: np.minimum(v, 1.0).sum(axis=1),  # each at most 1, twice the limit: eqs. (16)-(18) as printed
+}
+"""Degrees (k,) of violations v (k, c) by name, after Chai and others (2020)."""
+DEGREES = ("largest", *SUMS)
 
 
 @dataclass(repr=False, kw_only=True)
@@ -45,7 +57,7 @@ class State:
 
     def note(self, tolerance: float) -> None:
         """Update `first_feasible` and `all_feasible` by the population of this generation."""
-        feasible = constraints.excess(self.members.F, self.members.violation, tolerance) == 0.0
+        feasible = excess(self.members.F, self.members.violation, tolerance) == 0.0
         if feasible.any() and not self.first_feasible:
             self.first_feasible = self.iteration + 1
         if feasible.all() and not self.all_feasible:
@@ -100,13 +112,13 @@ class PopulationSolver(Solver):
                 check_interval(name, value, allowed)
             elif isinstance(setting.default, bool) and not isinstance(value, bool | np.bool_):
                 raise ValueError(f"{name} must be True or False, not {value!r}")
-        check_choice(f"{kind}: handling", self.handling, constraints.HANDLINGS)
-        check_choice(f"{kind}: degree", self.degree, constraints.DEGREES)
+        check_choice(f"{kind}: handling", self.handling, HANDLINGS)
+        check_choice(f"{kind}: degree", self.degree, DEGREES)
 
     def extra_stats(self, state: State, evaluator: Evaluator) -> dict[str, Any]:
         """See `SearchMethod.extra_stats`."""
         members = state.members
-        feasible = members.take(constraints.excess(members.F, members.violation, evaluator.tolerance) == 0.0)
+        feasible = members.take(excess(members.F, members.violation, evaluator.tolerance) == 0.0)
         return {
             "population": {
                 "generations": state.iteration + 1,
@@ -118,10 +130,10 @@ class PopulationSolver(Solver):
             }
         }
 
-    def _presented(self, points: Members, tolerance: float) -> constraints.Presented:
+    def _presented(self, points: Members, tolerance: float) -> Presented:
         """Objectives and violations of points as presented to the algorithm."""
-        F, cv = constraints.presented(self.handling, self.penalty, points.F, points.violation, tolerance, points.degree)
-        return (F, cv) if self.COMPARES_VIOLATIONS else (constraints.by_objectives(F, cv), np.zeros(len(cv)))
+        F, cv = presented(self.handling, self.penalty, points.F, points.violation, tolerance, points.degree)
+        return (F, cv) if self.COMPARES_VIOLATIONS else (by_objectives(F, cv), np.zeros(len(cv)))
 
     def _presented_count(self, m: int) -> int:
         """Number of objectives as presented to the algorithm, for a problem with m."""
@@ -156,7 +168,7 @@ class Members(Archive):
 
     SHAPES: ClassVar[dict[str, str]] = Archive.SHAPES | {"degree": "n"}
 
-    degree: np.ndarray  # (n,): Number by which infeasible points are ranked; see `constraints.degree`
+    degree: np.ndarray  # (n,): Number by which infeasible points are ranked; see `violation_degree`
 
 
 def evaluate(evaluator: Evaluator, Z: np.ndarray, by: str) -> Members:
@@ -165,7 +177,7 @@ def evaluate(evaluator: Evaluator, Z: np.ndarray, by: str) -> Members:
     Each has the position to which the evaluator moved it; after a failure without a result, its original position.
     """
     seen = evaluator.evaluate(Z)
-    degree = constraints.degree(by, seen.violation, lambda: seen.violations, evaluator.tolerance)
+    degree = violation_degree(by, seen.violation, lambda: seen.violations, evaluator.tolerance)
     return Members(np.where(np.isfinite(seen.Z), seen.Z, Z), seen.F, seen.violation, degree)
 
 
@@ -188,3 +200,51 @@ def shown(tolerance: float, *groups: Members) -> Archive | None:
         if len(feasible):
             return Archive.of(feasible, nondominated(feasible.F))
     return None
+
+
+# Constraint handling: only here does a violation or a failure become part of an objective; states and fronts keep the original values.
+
+
+def excess(F: np.ndarray, violation: np.ndarray, tolerance: float, degree: np.ndarray | None = None) -> np.ndarray:
+    """Degree of violation (n,), by default the violation itself: 0 if the violation is within the tolerance, infinite if the evaluation
+    failed."""
+    failed = ~np.isfinite(F).all(axis=1) | ~np.isfinite(violation)
+    return np.where(failed, np.inf, np.where(violation <= tolerance, 0.0, violation if degree is None else degree))
+
+
+def presented(
+    handling: str, factor: float, F: np.ndarray, violation: np.ndarray, tolerance: float, degree: np.ndarray | None = None
+) -> Presented:
+    """Objectives and violations of points as presented to an algorithm with this `handling`; `degree` (n,) is by default the violation.
+
+    "feasible-first": superiority of feasible solutions (Deb 2000), that is, feasible points are compared by objectives, infeasible ones by
+    violation. This is Definition 1 of Chai and others (2020) except for its third line: feasible points are compared by Pareto dominance,
+    which does not require every single objective to be better. "penalty": `factor` times the violation is added to every objective.
+    "objective": the violation is an additional objective, the last one.
+    """
+    cv = excess(F, violation, tolerance, degree)
+    finite = np.isfinite(cv)
+    if handling == "penalty":
+        F = F + factor * np.where(finite, cv, 0.0)[:, None]
+    elif handling == "objective":
+        F = np.hstack([F, cv[:, None]])
+    # What failed has a finite number, which is not used.
+    return np.where(finite[:, None], F, BEYOND_ALL), cv if handling == "feasible-first" else np.where(finite, 0.0, cv)
+
+
+def by_objectives(F: np.ndarray, cv: np.ndarray) -> np.ndarray:
+    """Objectives (n, m) that include the violation, for algorithms that compare objectives only: feasible points come first.
+
+    Every objective of an infeasible point exceeds that of any feasible one, and increases with the violation. So less violated points
+    dominate more violated ones, and are better in any Tchebycheff or boundary-intersection scalarisation.
+    """
+    share = np.divide(cv, 1.0 + cv, out=np.ones_like(cv), where=np.isfinite(cv))
+    return np.where((cv > 0.0)[:, None], BEYOND_ALL * (1.0 + share)[:, None], F)
+
+
+def violation_degree(name: str, violation: np.ndarray, violations: Callable[[], np.ndarray], tolerance: float) -> np.ndarray:
+    """Degree of violation (k,) of points: infinite if the evaluation failed, positive if the violation exceeds the tolerance."""
+    if name == "largest":
+        return violation
+    v = np.nan_to_num(violations(), nan=np.inf, posinf=np.inf)
+    return np.where(np.isfinite(violation), SUMS[name](np.where(v > tolerance, v, 0.0)), np.inf)

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..evaluation.evaluator import Evaluator, UnitBox
 from ..pareto.dominance import dominates, nondominated
-from .constraints import excess
-from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
+from .population import Members, PopulationSolver, State, distinct, evaluate, excess, full_vectors, thinned
 from .pymoo_adapter import Baseline
 
 SETTLING = 20
@@ -200,7 +199,7 @@ class MOPSO(PopulationSolver):
         return "settled" if (np.abs(state.means - now) < self.settled * np.abs(now)).all() else ""
 
     def _goals(self, points: Members, tolerance: float) -> np.ndarray:
-        """Objectives (n, m) that include the violation; see `constraints.by_objectives`."""
+        """Objectives (n, m) that include the violation; see `by_objectives`."""
         return self._presented(points, tolerance)[0]
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from macs import MOPSO, NSGA2
-from macs.baselines.constraints import DEGREES, by_objectives, degree, excess, presented
+from macs.baselines.population import DEGREES, by_objectives, excess, presented
+from macs.baselines.population import violation_degree as degree
 from macs.pareto.dominance import constrained_dominates, dominates
 
 VALUES = st.floats(-1e9, 1e9).map(lambda value: round(value, 3))
