@@ -96,12 +96,12 @@ def individual_actions(trials: Trials) -> None:
     waiting = acting = acting_agents(count, settings.agents, state.excess, rng)
     undirected = (np.arange(count) >= settings.agents) & (m > CURVE)  # of those on a surface
 
-    def attempt(propose: Proposal, velocity: bool = False, able: np.ndarray | None = None) -> None:
+    def attempt(propose: Proposal, able: np.ndarray | None = None, scan: bool = False) -> None:
         nonlocal waiting
         rows = waiting if able is None else waiting[able[waiting]]
         if rows.size:
             X = trials.positions(rows)
-            better = rows[trials.evaluate_and_accept(rows, X, propose(rows, X), velocity)]
+            better = rows[trials.evaluate_and_accept(rows, X, propose(rows, X), scan)]
             waiting = waiting[~np.isin(waiting, better)]
 
     def along_velocity(rows: np.ndarray, X: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ def individual_actions(trials: Trials) -> None:
         length = rng.random((2, count)) * agents.rho / 2
         side = rng.choice([-1.0, 1.0], count)
         for step in (side * length[0], -side * length[1]):
-            attempt(along_coordinate(coordinate, step), velocity=True, able=scanned > tried)
+            attempt(along_coordinate(coordinate, step), able=scanned > tried, scan=True)
     attempt(by_differences)
     if count > settings.agents:
         share_evaluations(state, trials.gained, trials.tried, settings.agents)

@@ -62,7 +62,7 @@ def social_actions(trials: Trials) -> None:
         taken = rng.random(len(rows)) < share
         trial = np.where(taken[:, None], current_to_rand(box, X, archive, near, variant.F, rng), trial)
     if variant.social_moves:
-        trials.evaluate_and_accept(rows, X, trial, velocity=False)
+        trials.evaluate_and_accept(rows, X, trial)
     else:
         trials.evaluate(agents.Z[rows], X, trial)
 

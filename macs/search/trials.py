@@ -162,11 +162,11 @@ class Trials:
             whole = whole.joined(part)
         return whole.take(np.argsort(np.argsort(chosen, kind="stable"), kind="stable"))
 
-    def evaluate_and_accept(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, velocity: bool = True) -> np.ndarray:
+    def evaluate_and_accept(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, scan: bool = False) -> np.ndarray:
         """Evaluate the proposals (k, d) of the agents `rows` at X (k, d), move the agents with success, and return the mask (k,) of these.
 
         A success is dominance over the agent, or a better value for its direction. Velocities use the displacements after the inner level,
-        not the proposed ones. Without `velocity`, an agent with success is left at rest.
+        not the proposed ones. Without momentum, only a success of pattern search, a `scan`, leaves the agent with a velocity.
         """
         success = np.zeros(len(rows), dtype=bool)
         moved, result = self.evaluate(self.state.agents.Z[rows], X, trial)
@@ -181,7 +181,8 @@ class Trials:
         proposed = self.box.difference(trial, X)
         achieved = self.box.difference(self.box.to_unit(result.Z[:, free]), X)
         self.successful[rows] |= better & ((proposed * achieved).sum(axis=1) >= STEP_KEPT * (proposed**2).sum(axis=1))
-        agents.velocity[rows[better]] = achieved[better] if velocity else 0.0
+        momentum, moving = self.settings.variant.momentum, rows[better]
+        agents.velocity[moving] = achieved[better] + momentum * agents.velocity[moving] if momentum or scan else 0.0
         agents.place(rows[better], result.Z[better], result.F[better], result.violation[better])
         success[moved] = better
         return success

@@ -56,6 +56,7 @@ def patched(target: Any, name: str, other: Any) -> Switch:
 
 GENERAL: dict[str, Switch] = {
     "agents move by social actions": variant(social_moves=False),
+    "momentum": variant(momentum=0.0),
     "directions are drawn again": variant(redraw=False),
     "fewer coordinates": variant(adaptive_coordinates=False),
     "breeding": variant(breeding=False),
@@ -72,6 +73,7 @@ PARTS: dict[str, dict[str, Switch]] = {
         "credit of repair": patched(Credit, "rates", lambda self, prior=0.0: np.ones(len(self.gained))),
         "infeasible parents": patched(archives, "outside", lambda known, *rest, **more: known.take(np.arange(0))),
     },
+    "coupled variables": GENERAL | VOLUME,
     "surfaces": GENERAL | VOLUME | ALPHA,
     "many objectives": {"breeding": GENERAL["breeding"], **ALPHA, "niches": patched(archives, "MANY", 99)},
     "trajectories": GENERAL,
@@ -111,6 +113,14 @@ def crash(X: np.ndarray) -> np.ndarray:
     return np.column_stack([mass, acceleration, intrusion])
 
 
+def coupled(X: np.ndarray, slower: float) -> np.ndarray:
+    """LZ09_F3, whose set of best points is a curve through 30 dimensions, and F4, in which half of it turns `slower` (Li and Zhang 2009)."""
+    x, j = X[:, :1], np.arange(2, X.shape[1] + 1)
+    angle, odd = 6.0 * np.pi * x + j * np.pi / X.shape[1], j % 2 == 1
+    far = (X[:, 1:] - 0.8 * x * np.where(odd, np.cos(angle / slower), np.sin(angle))) ** 2
+    return np.hstack([x, 1.0 - x**0.5]) + 2.0 * np.column_stack([far[:, odd].mean(axis=1), far[:, ~odd].mean(axis=1)])
+
+
 def thin_kursawe(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Kursawe's function on a surface, an equality stated as a limit on an absolute value."""
     return from_pymoo("kursawe")[0].evaluate(X), np.abs(X[:, :1] + 0.5 * X[:, 1:2] ** 2 - X[:, 2:] - 1.0) - 1e-3
@@ -127,6 +137,10 @@ PROBLEMS: dict[str, dict[str, Stated]] = {
         "thin Kursawe": lambda: (thin_kursawe, [(-5.0, 5.0)] * 3),
         "welded_beam": None,
     },
+    "coupled variables": {
+        name: partial(lambda slower: (partial(coupled, slower=slower), [(0.0, 1.0)] + [(-1.0, 1.0)] * 29), slower)
+        for name, slower in (("LZ09_F3", 1.0), ("LZ09_F4", 3.0))
+    },
     "surfaces": {
         **{f"WFG{k}": partial(from_pymoo, f"wfg{k}", n_var=14, n_obj=3) for k in (4, 9)},
         "crash": lambda: (crash, [(1.0, 3.0)] * 5),
@@ -135,8 +149,9 @@ PROBLEMS: dict[str, dict[str, Stated]] = {
     "trajectories": dict.fromkeys(("goddard", "orbit_rise", "landing_site", "aerocapture")),
     "gradients": dict.fromkeys(("goddard", "landing_site")),
 }
-"""Problems by kind; None: of the catalogue. The first three kinds have archives of 50 points, the others of 10."""
-BUDGETS = {"curves": 2000, "constraints": 2000, "surfaces": 2000, "many objectives": 2000, "trajectories": 300, "gradients": 200}
+"""Problems by kind; None: of the catalogue. The first four kinds have archives of 50 points, the others of 10."""
+BUDGETS = {"curves": 2000, "constraints": 2000, "coupled variables": 30_000, "surfaces": 2000, "many objectives": 2000}
+BUDGETS |= {"trajectories": 300, "gradients": 200}
 
 
 def measure(rows: list[Row], effort: Effort) -> None:

@@ -3,6 +3,7 @@
 import copy
 
 import numpy as np
+import pytest
 
 from macs.evaluation.evaluator import Counts, Evaluation, Evaluator
 from macs.search.macs import MACS
@@ -28,8 +29,8 @@ class Sticky(Evaluator):
         return Evaluation(back, F, np.zeros(len(Z)), np.full(len(Z), "converged")), 1
 
 
-def prepared():
-    box, settings = Sticky(), MACS()
+def prepared(settings=None):
+    box, settings = Sticky(), settings or MACS()
     state = settings.begin(box, 1000, np.random.default_rng(0))
     agents = state.agents
     agents.Z[:], agents.velocity[:] = [0.8, 0.8, 0.5], 0.0
@@ -48,13 +49,17 @@ def test_the_velocity_is_what_was_achieved():
     assert (state.agents.velocity[5] == 0.0).all()
 
 
-def test_without_velocity_a_success_leaves_its_agent_at_rest_and_a_failure_as_it_was():
-    _, state, trials = prepared()
+@pytest.mark.parametrize(
+    ("settings", "scan", "velocity"),
+    [(MACS(), False, [-0.13, 0.07]), (MACS(), True, [-0.13, 0.07]), (MACS.paper(), False, [0.0, 0.0]), (MACS.paper(), True, [-0.2, 0.0])],
+)
+def test_a_success_adds_a_part_of_the_last_velocity_and_a_failure_leaves_all_of_it(settings, scan, velocity):
+    _, state, trials = prepared(settings)
     rows = np.array([2, 5])
     X = trials.positions(rows)
     state.agents.velocity[:] = 0.1
-    trials.evaluate_and_accept(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]), velocity=False)
-    assert np.allclose(state.agents.velocity[[2, 5, 6]], [[0.0, 0.0], [0.1, 0.1], [0.1, 0.1]])
+    trials.evaluate_and_accept(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]), scan)
+    assert np.allclose(state.agents.velocity[[2, 5, 6]], [velocity, [0.1, 0.1], [0.1, 0.1]])
 
 
 def test_what_is_only_looked_at_is_seen_and_changes_no_agent():
