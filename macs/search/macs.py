@@ -105,6 +105,7 @@ class MACS(Settings, Solver):
             ideal=np.full(m, np.nan),
             nadir=np.full(m, np.nan),
             directions=directions.pool(m, self.directions_to_draw_from(m)),
+            experience=np.empty((0, d)),
             samples=ResidualSamples.none(d),
             operators=Credit.equal(2),
             repairs=Credit.equal(2),

@@ -27,9 +27,10 @@ GONE = {
         ("rho", "F", "CR", "contraction", "max_contractions", "adaptive_coordinates", "redraw", "reseed", "shorten"), ELSEWHERE
     ),
     **dict.fromkeys(
-        ("momentum", "keep_velocity", "social_moves", "breeding", "restore", "exponent", "lone", "directions", "sample"), ELSEWHERE
+        ("momentum", "keep_velocity", "experience", "social_moves", "breeding", "restore", "exponent", "lone", "directions", "sample"),
+        ELSEWHERE,
     ),
-    **dict.fromkeys(("concentration", "experience", "memory"), "it brought no more than noise; leave it out"),
+    **dict.fromkeys(("concentration", "memory"), "it brought no more than noise; leave it out"),
     "social": "all agents do social actions; leave it out",
     "coordinates": "leave it out, or use MACS.paper(), which scans all coordinates",
     "refine_every": "one gradient solve of an agent follows every 200 evaluations; use polish_every for their largest number",
@@ -55,6 +56,7 @@ class Variant:
     max_contractions: int = 5  # their number after which the radius is reset (Table I)
     # Part of the last velocity that is added to the displacement by a success; 0: only pattern search gives a velocity, as in the paper.
     momentum: float = 0.7
+    experience: float = 0.3  # probability that a social action repeats past improvements of all agents
     adaptive_coordinates: bool = True  # pattern search tries the fewer coordinates, the fuller the archive (the authors' later code)
     redraw: bool = True  # directions are drawn anew in each iteration, from 100 for each objective (the authors' later code)
     shorten: bool = False  # steps of inertia end in the box, as in the paper; else each variable is clipped
@@ -76,6 +78,7 @@ class Variant:
 
 PAPER = Variant(
     momentum=0.0,
+    experience=0.0,
     adaptive_coordinates=False,
     redraw=False,
     shorten=True,

@@ -1,4 +1,4 @@
-"""Social actions: proposals from the population and the archive; directions of agents (Ricciardi and Vasile 2015)."""
+"""Social actions: proposals from the population, the archive and past improvements; directions of agents (Ricciardi and Vasile 2015)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .state import NO_DIRECTION, SearchState
 from .trials import Trials
 
 FEWEST_PARENTS = 4
-"""Least number of points that parents are drawn from."""
+"""Least number of points that parents are drawn from, and of past improvements that are repeated."""
 
 
 def nearest_rows(box: UnitBox, X: np.ndarray, pool: np.ndarray, count: int) -> np.ndarray:
@@ -43,10 +43,23 @@ def current_to_rand(box: UnitBox, X: np.ndarray, pool: np.ndarray, count: int, F
     return box.put_back(X + K * step)
 
 
+def like_improvements(box: UnitBox, X: np.ndarray, experience: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Proposals (k, d) by normally distributed steps with the mean and the second moments of past displacements (e, d).
+
+    A step that improved one point of a front often improves its neighbours, too, and the longest such steps gained most. The covariance is
+    estimated from successful steps, as by Hansen and Ostermeier (2001), without forming its matrix.
+    """
+    count = len(experience)
+    weights = rng.standard_normal((len(X), count)) / np.sqrt(count) + 1.0 / count
+    # No matrix product: with another number of threads BLAS may sum in another order.
+    return box.put_back(X + np.einsum("ke,ed->kd", weights, experience))
+
+
 def social_actions(trials: Trials) -> None:
     """Evaluate one proposal for each social agent, and move the agents with success if the variant says so.
 
-    Parents are agents or, with a probability that grows with the archive's size relative to the population's, points of the archive.
+    Parents are agents or, with a probability that grows with the archive's size relative to the population's, points of the archive. Some
+    proposals repeat past improvements instead.
     """
     state, settings, box = trials.state, trials.settings, trials.box
     agents, rng, variant = state.agents, state.rng, settings.variant
@@ -61,6 +74,9 @@ def social_actions(trials: Trials) -> None:
         share = 1.0 - float(np.exp(-len(archive) / len({row.tobytes() for row in population})))
         taken = rng.random(len(rows)) < share
         trial = np.where(taken[:, None], current_to_rand(box, X, archive, near, variant.F, rng), trial)
+    if variant.experience and len(state.experience) >= FEWEST_PARENTS:
+        taken = rng.random(len(rows)) < variant.experience
+        trial = np.where(taken[:, None], like_improvements(box, X, state.experience, rng), trial)
     if variant.social_moves:
         trials.evaluate_and_accept(rows, X, trial)
     else:

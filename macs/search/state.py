@@ -23,6 +23,8 @@ FORGET = 0.1
 """Part of all credit that is forgotten when new is given."""
 KEPT_SAMPLES = 500
 """Most points whose residuals are kept, the last ones."""
+KEPT_IMPROVEMENTS = 100
+"""Most displacements of improvements that are kept, the last ones."""
 
 
 @dataclass(repr=False)
@@ -146,7 +148,7 @@ class GradientMemory:
 class SearchState:
     """All data of a search between two iterations: with the same evaluator and settings it continues to the same bits."""
 
-    SHAPES: ClassVar[dict[str, str]] = {"ideal": "m", "nadir": "m", "directions": "k m", "spent": "w 3"}
+    SHAPES: ClassVar[dict[str, str]] = {"ideal": "m", "nadir": "m", "directions": "k m", "experience": "e d", "spent": "w 3"}
     INDICES: ClassVar[dict[str, str]] = {"agents.direction": "directions"}
 
     agents: Agents
@@ -158,6 +160,7 @@ class SearchState:
     ideal: np.ndarray  # (m,): best feasible values ever evaluated; NaN as long as no point was feasible
     nadir: np.ndarray  # (m,): worst values in the archive
     directions: np.ndarray  # (k, m): pool from which the directions of the agents are drawn
+    experience: np.ndarray  # (e, d): displacements of the last improvements of agents, in units of span, oldest first
     samples: ResidualSamples  # the last points with the residuals of all constraints, for `repair`
     operators: Credit  # of crossover, and of differences in the second row: offspring that stayed in the archive, and all of them
     repairs: Credit  # of steps of repair, in the second row, and of all other evaluations

@@ -17,7 +17,7 @@ from ..pareto.directions import tchebycheff
 from ..pareto.dominance import constrained_dominates
 from .rounds import PLANNED_EVALUATIONS
 from .settings import Settings
-from .state import NO_DIRECTION, Credit, SearchState
+from .state import KEPT_IMPROVEMENTS, NO_DIRECTION, Credit, SearchState
 
 STEP_KEPT = 0.5
 """Least fraction of a proposed step that the inner level must leave, for the success to expand the radius."""
@@ -165,8 +165,9 @@ class Trials:
     def evaluate_and_accept(self, rows: np.ndarray, X: np.ndarray, trial: np.ndarray, scan: bool = False) -> np.ndarray:
         """Evaluate the proposals (k, d) of the agents `rows` at X (k, d), move the agents with success, and return the mask (k,) of these.
 
-        A success is dominance over the agent, or a better value for its direction. Velocities use the displacements after the inner level,
-        not the proposed ones. Without momentum, only a success of pattern search, a `scan`, leaves the agent with a velocity.
+        A success is dominance over the agent, or a better value for its direction. Velocities and experience use the displacements after
+        the inner level, not the proposed ones. Without momentum, only a success of pattern search, a `scan`, leaves the agent with a
+        velocity.
         """
         success = np.zeros(len(rows), dtype=bool)
         moved, result = self.evaluate(self.state.agents.Z[rows], X, trial)
@@ -183,6 +184,7 @@ class Trials:
         self.successful[rows] |= better & ((proposed * achieved).sum(axis=1) >= STEP_KEPT * (proposed**2).sum(axis=1))
         momentum, moving = self.settings.variant.momentum, rows[better]
         agents.velocity[moving] = achieved[better] + momentum * agents.velocity[moving] if momentum or scan else 0.0
+        self.state.experience = np.vstack([self.state.experience, achieved[improved]])[-KEPT_IMPROVEMENTS:]
         agents.place(rows[better], result.Z[better], result.F[better], result.violation[better])
         success[moved] = better
         return success

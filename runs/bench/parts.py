@@ -57,6 +57,7 @@ def patched(target: Any, name: str, other: Any) -> Switch:
 GENERAL: dict[str, Switch] = {
     "agents move by social actions": variant(social_moves=False),
     "momentum": variant(momentum=0.0),
+    "past improvements": variant(experience=0.0),
     "directions are drawn again": variant(redraw=False),
     "fewer coordinates": variant(adaptive_coordinates=False),
     "breeding": variant(breeding=False),
@@ -121,6 +122,14 @@ def coupled(X: np.ndarray, slower: float) -> np.ndarray:
     return np.hstack([x, 1.0 - x**0.5]) + 2.0 * np.column_stack([far[:, odd].mean(axis=1), far[:, ~odd].mean(axis=1)])
 
 
+def ellipsoids(X: np.ndarray) -> np.ndarray:
+    """ELLI1: two long ellipsoids along the same axes, which lie oblique to those of the variables (Igel, Hansen and Roth 2007)."""
+    n = X.shape[1]
+    axes, _ = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))
+    y = X @ axes
+    return np.column_stack([(((y - centre) ** 2) * 1000.0 ** (2.0 * np.arange(n) / (n - 1) - 2.0)).mean(axis=1) for centre in (0.0, 2.0)])
+
+
 def thin_kursawe(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Kursawe's function on a surface, an equality stated as a limit on an absolute value."""
     return from_pymoo("kursawe")[0].evaluate(X), np.abs(X[:, :1] + 0.5 * X[:, 1:2] ** 2 - X[:, 2:] - 1.0) - 1e-3
@@ -138,8 +147,11 @@ PROBLEMS: dict[str, dict[str, Stated]] = {
         "welded_beam": None,
     },
     "coupled variables": {
-        name: partial(lambda slower: (partial(coupled, slower=slower), [(0.0, 1.0)] + [(-1.0, 1.0)] * 29), slower)
-        for name, slower in (("LZ09_F3", 1.0), ("LZ09_F4", 3.0))
+        **{
+            name: partial(lambda slower: (partial(coupled, slower=slower), [(0.0, 1.0)] + [(-1.0, 1.0)] * 29), slower)
+            for name, slower in (("LZ09_F3", 1.0), ("LZ09_F4", 3.0))
+        },
+        "ELLI1": lambda: (ellipsoids, [(-10.0, 10.0)] * 10),
     },
     "surfaces": {
         **{f"WFG{k}": partial(from_pymoo, f"wfg{k}", n_var=14, n_obj=3) for k in (4, 9)},

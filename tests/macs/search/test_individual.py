@@ -16,7 +16,7 @@ from macs.search.individual import (
     inertia,
     share_evaluations,
 )
-from macs.search.social import current_to_rand, nearest_rows
+from macs.search.social import current_to_rand, like_improvements, nearest_rows
 from macs.search.state import Credit
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -50,12 +50,22 @@ def test_every_proposal_is_in_the_box(seed, wrap):
         differential(cube, X, donors, 0.9, 0.9, rng),
         along_archive(cube, X, rng.random((10, d)), rng),
         current_to_rand(cube, X, rng.random((10, d)), 5, 0.9, rng),
+        like_improvements(cube, X, rng.normal(size=(10, d)), rng),
     ]
     for trial in proposals:
         assert trial.shape == X.shape
         assert ((trial >= 0.0) & (trial <= 1.0)).all()
         values = cube.to_values(trial)
         assert ((values >= -2.0) & (values <= 6.0)).all()
+
+
+def test_improvements_are_repeated_with_their_mean_and_their_second_moments():
+    rng, X = np.random.default_rng(0), np.full((100_000, 3), 0.5)
+    past = 0.01 * rng.normal(size=(12, 3)) @ np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]) + [0.01, 0.0, 0.0]
+    steps = like_improvements(box(3), X, past, rng) - X
+    assert np.allclose(steps.mean(axis=0), past.mean(axis=0), atol=5e-4)
+    assert np.allclose(np.cov(steps.T), past.T @ past / 12, atol=5e-5)
+    assert (steps[:, 2] == 0.0).all()  # only along past improvements
 
 
 def test_periodic_coordinates_wrap_and_others_stop_at_the_bound():
