@@ -115,7 +115,7 @@ def crash(X: np.ndarray) -> np.ndarray:
 
 
 def coupled(X: np.ndarray, slower: float) -> np.ndarray:
-    """LZ09_F3, whose set of best points is a curve through 30 dimensions, and F4, in which half of it turns `slower` (Li and Zhang 2009)."""
+    """LZ09_F3, whose Pareto set is a curve through 30 dimensions, and F4, where half of it turns `slower` (Li and Zhang 2009)."""
     x, j = X[:, :1], np.arange(2, X.shape[1] + 1)
     angle, odd = 6.0 * np.pi * x + j * np.pi / X.shape[1], j % 2 == 1
     far = (X[:, 1:] - 0.8 * x * np.where(odd, np.cos(angle / slower), np.sin(angle))) ** 2
