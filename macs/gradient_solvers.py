@@ -11,17 +11,16 @@ import numpy as np
 from problems.checks import check_choice, check_count
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
-from problems.vector import CompiledVectorProblem, VectorProblem, without_dynamics
+from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.base import Transcription
 
 from .evaluation.evaluator import CONVERGED, Evaluator
 from .front import Front
 from .fronts.builders import nearest_violation
-from .fronts.verified import VERIFY
 from .gradient_tools import AUTO, check_starts, optimize, payoff, sweep
 from .gradients.ends import METHODS, check_points
 from .solvers.solver import Solver
-from .solvers.start import check_run, drawing
+from .solvers.start import Call, drawing
 
 MESHES = ("fixed", "mended", "adaptive", "density")
 
@@ -58,41 +57,26 @@ class GradientSolver(Solver):
         """See `SearchMethod.searches_until_done`: it evaluates no candidates."""
         return True
 
-    def solve(
+    def _solve(
         self,
-        problem: Problem | CompiledProblem | VectorProblem | CompiledVectorProblem,
-        transcription: Transcription | None = None,
-        *,
-        evaluations: int | None = None,
-        seed: int | None = None,
-        inner: Any = None,
-        tolerance: float = 1e-6,
-        start: Any = None,
-        verify: float | None = VERIFY,
-        time_limit: float | None = None,
-        progress: bool | None = None,
-        callback: Any = None,
-        checkpoint: Any = None,
+        problem: Problem | CompiledProblem,
+        transcription: Transcription | None,
+        inner: Any,
+        start: Any,
+        verify: float | None,
+        call: Call,
     ) -> Front:
-        """See `Solver.solve` and the class. `start` holds vectors that are known; words for random first candidates are not used."""
-        if isinstance(problem, VectorProblem | CompiledVectorProblem):
-            self.check_vector(problem.compile())
-        assert isinstance(problem, Problem | CompiledProblem)
-        check_run(evaluations or 1, seed, tolerance, time_limit, callback, checkpoint)
-        known = start if drawing(start) is None else None
+        """The front of `find` on the meshes of the setting. Words for random first candidates are not used."""
         remeshed = transcription is not None and self.mesh in ("adaptive", "density")
         terms = {
-            "start": known,
+            "start": start if drawing(start) is None else None,
             "starts": self.starts,
-            "seed": seed,
-            "tolerance": tolerance,
-            "time_limit": time_limit,
-            "progress": progress,
+            **{name: getattr(call, name) for name in ("seed", "tolerance", "time_limit", "progress")},
         }
         front = self.find(problem, transcription, **terms, verify=None if remeshed else verify)
-        left = None if time_limit is None else time_limit - front.stats["wall_time"]
+        left = None if call.time_limit is None else call.time_limit - front.stats["wall_time"]
         if transcription is not None and "stopped" not in front.stats and len(front) and (left is None or left > 0.0):
-            front = self.remeshed(front, left, progress)
+            front = self.remeshed(front, left, call.progress)
         return front.verify(verify) if remeshed and verify is not None else front
 
     def remeshed(self, front: Front, time_limit: float | None, progress: bool | None) -> Front:

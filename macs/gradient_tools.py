@@ -40,7 +40,7 @@ from .pareto.dominance import BETTER, distinct
 from .refinement.mending import mended, resolve_unverified
 from .refinement.mesh_loop import MeshLoop, Programs
 from .refinement.mesh_search import SEARCH, MeshSearch, coarse_meshes, search_meshes
-from .solvers.start import beginning, check_run
+from .solvers.start import Call, beginning
 
 AUTO = "auto"
 """As many starts as pay."""
@@ -246,7 +246,7 @@ class Terms:
     progress: bool | None
 
     def __post_init__(self) -> None:
-        check_run(1, self.seed, self.tolerance, self.time_limit, None, None)
+        Call(None, self.seed, self.tolerance, self.time_limit)
         check_starts("starts", self.starts)
         check_count("max_iterations", self.max_iterations, 1)
         check_verify(self.verify)

@@ -17,23 +17,10 @@ from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evalua
 
 
 class BlackBox(Evaluator):
-    """Evaluator of a vector problem.
+    """Evaluator of a vector problem. A point none of whose violations exceeds the tolerance is feasible.
 
-    Parameters
-    ----------
-    problem : CompiledVectorProblem
-    tolerance : float, default 1e-6
-        A point none of whose violations exceeds this is feasible.
-
-    Notes
-    -----
     The number of objectives `m` is known from the problem, or from the first batch. Reading `m` before that costs one evaluation, of the
-    centre of the box, which is counted.
-
-    Raises
-    ------
-    ValueError
-        If the tolerance is no number, or the result of a function has the wrong type or shape; the message names it.
+    centre of the box, which is counted. ValueError where the result of a function has the wrong type or shape; the message names it.
     """
 
     def __init__(self, problem: CompiledVectorProblem, tolerance: float = 1e-6) -> None:
@@ -48,7 +35,7 @@ class BlackBox(Evaluator):
 
     @property
     def m(self) -> int:
-        """Number of objectives; see the notes of the class."""
+        """Number of objectives; see the class."""
         if self.m_known is None:
             self.evaluate((self.lower + self.upper)[None] / 2)
         assert self.m_known is not None
@@ -102,32 +89,10 @@ def plain_problem(
     senses: Sequence[str] | None = None,
     name: str = "",
 ) -> CompiledVectorProblem:
-    """The vector problem of a plain vector function or a pymoo Problem.
+    """The vector problem of a plain vector function or a pymoo Problem; see `Solver.minimize` for the arguments and what is refused.
 
-    Parameters
-    ----------
-    function : callable or pymoo Problem
-        `function(X: (n, d)) -> F: (n, m)` or `(F, G)`. A row with NaN or a masked value is a failed evaluation.
-    bounds : sequence of d pairs, pair of arrays (d,), or dict of pairs by name; None for a pymoo problem
-        Two sequences of more than two numbers each are (lower, upper); all else is a list of pairs.
-    constraints : callable, optional
-        `constraints(X: (n, d)) -> G: (n, c)`; G <= 0 is feasible. Its columns come after those of the function's own G.
-    names, units : sequences of m str, optional
-        Of the objectives. Default: "f1", "f2", ..., and no units.
-    senses : sequence of m of "minimize" or "maximize", optional
-        Default: all minimised.
-    name : str, optional
-        A front keeps it; without a name it does not say what it is of.
-
-    Returns
-    -------
-    CompiledVectorProblem
-        Its variables are called as the keys of `bounds`, else "x1", "x2", ...; its `goals` are empty if nothing says how many there are.
-
-    Raises
-    ------
-    ValueError
-        If an argument has the wrong type or shape; the message names it.
+    Its variables are called as the keys of `bounds`, else "x1", "x2", ...; its `goals` are empty if nothing says how many there are. A
+    front keeps the `name`; without one it does not say what it is of.
     """
     m: int | None = None
     equalities: tuple[int, ...] = ()

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
-from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from problems.compiled import Objective
 from transcription.stopping import Stopped, stopped_by
 
 from ..evaluation.evaluator import Counts, Evaluator
@@ -22,6 +20,7 @@ from ..io.interrupts import Interrupts
 from .checkpoint import Checkpoint, RunStatus
 from .method import SearchMethod
 from .progress import Progress, SearchDisplay
+from .start import Call
 
 IDLE_ITERATIONS = 100
 """Number of successive iterations without any evaluation after which a search ends."""
@@ -35,37 +34,29 @@ class SearchRun:
 
     solver: SearchMethod
     evaluator: Evaluator
-    # Function that returns the objectives; called after the first evaluation, before which a black box may not know their number.
-    goals: Callable[[], Sequence[Objective]]
     # (state, stats) -> Front; the state is None if the search was ended before its first population was evaluated.
     make_front: Callable[[Any, dict[str, Any]], Front]
-    # Largest number of evaluations. None: the search goes on in rounds until it is done, see `SearchMethod.searches_until_done`.
-    budget: int | None
-    seed: int | None  # none draws one
+    call: Call  # without a number of evaluations, the search goes on in rounds until it is done, see `SearchMethod.searches_until_done`
     start: np.ndarray | None  # (k, D): Full vectors to begin with
     what: Mapping[str, Any]  # problem, solver and settings as data: a checkpoint belongs to these and to the fields above
 
-    def go(
-        self,
-        time_limit: float | None,
-        progress: bool | None,
-        callback: Callable[[Progress], Any] | None,
-        checkpoint: str | PathLike[str] | None = None,
-    ) -> Front:
+    def go(self) -> Front:
         """The front of the search, new or continued from its checkpoint, until the budget is spent or the search is stopped."""
+        checkpoint = self.call.checkpoint
         self._checkpoint = None if checkpoint is None else Checkpoint(checkpoint, self.solver, self._belongs(), self.evaluator.sizes)
-        found = self._checkpoint.read(self.seed) if self._checkpoint else None
-        status = found[1] if found else RunStatus(secrets.randbits(63) if self.seed is None else int(self.seed), Counts(), 0, 0.0)
+        seed = self.call.seed
+        found = self._checkpoint.read(seed) if self._checkpoint else None
+        status = found[1] if found else RunStatus(secrets.randbits(63) if seed is None else int(seed), Counts(), 0, 0.0)
         self._state: Any = found[0] if found else None
-        self.seed, self._idle = status.seed, status.idle
+        self._seed, self._idle = status.seed, status.idle
         if self._state is not None:
             self.evaluator.resume(status.counts, self._state.archive.F.shape[1])
         self._uncut = status.counts.clocked
-        self._callback, self._called_off = callback, ""
+        self._called_off = ""
         with (
             self._checkpoint or nullcontext(),
-            SearchDisplay(progress) as self._display,
-            Interrupts(time_limit, status.elapsed) as self._interrupts,
+            SearchDisplay(self.call.progress) as self._display,
+            Interrupts(self.call.time_limit, status.elapsed) as self._interrupts,
             stopped_by(self._asked_to_stop),
         ):
             stopped = status.stopped or self._search()
@@ -84,7 +75,7 @@ class SearchRun:
         if self._state is None:
             self.evaluator.before_batch = self._show
             try:
-                self._state = self.solver.begin(self.evaluator, self.budget, np.random.default_rng(self.seed), self.start)
+                self._state = self.solver.begin(self.evaluator, self.call.evaluations, np.random.default_rng(self._seed), self.start)
             except Stopped as reason:  # while something was built that even the first evaluations need
                 return str(reason)
             self._keep()
@@ -94,7 +85,7 @@ class SearchRun:
             while True:  # once, or round by round
                 self._search_round()
                 # This work is not stopped by an exception: asked to end, it keeps its results so far.
-                self.evaluator.before_batch = self._keep_and_write if self.budget is not None else self._keep_and_ask
+                self.evaluator.before_batch = self._keep_and_write if self.call.evaluations is not None else self._keep_and_ask
                 self.solver.conclude(self._state, self.evaluator)
                 if self._cut_short():
                     reason_given, self._called_off = self._reason, ""  # what follows the search is not to be cut short by it
@@ -109,7 +100,7 @@ class SearchRun:
 
     def _ended(self) -> str:
         """Why the run has ended, after its last round; empty if another follows."""
-        if self.budget is not None and self.evaluator.counts.evaluations >= self.budget:
+        if self.call.evaluations is not None and self.evaluator.counts.evaluations >= self.call.evaluations:
             return "budget"
         return self.solver.ended(self._state) or ("idle" if self._idle >= IDLE_ITERATIONS else "")
 
@@ -117,7 +108,7 @@ class SearchRun:
         """Search up to the budget, or to the end of the current round."""
         self.evaluator.before_batch = self._show_and_check
         counts = self.evaluator.counts
-        limit = self.solver.round_end(self._state) if self.budget is None else self.budget
+        limit = self.solver.round_end(self._state) if self.call.evaluations is None else self.call.evaluations
         while counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not self.solver.ended(self._state):
             spent = counts.evaluations
             self.solver.advance(self._state, self.evaluator, limit)
@@ -137,7 +128,7 @@ class SearchRun:
 
     def _call_back(self, progress: Progress) -> None:
         """Raise `Stopped` if the callback returns True."""
-        answer = None if self._callback is None else self._callback(progress)
+        answer = None if self.call.callback is None else self.call.callback(progress)
         if isinstance(answer, bool | np.bool_) and answer:
             raise Stopped("callback")
 
@@ -148,8 +139,7 @@ class SearchRun:
         counts = self.evaluator.counts
         self._uncut = counts.clocked
         if self._checkpoint:
-            assert self.seed is not None
-            self._checkpoint.keep(self._state, RunStatus(self.seed, counts, self._idle, self._interrupts.elapsed, stopped))
+            self._checkpoint.keep(self._state, RunStatus(self._seed, counts, self._idle, self._interrupts.elapsed, stopped))
 
     def _cut_short(self) -> bool:
         """Whether a time limit, Ctrl-C or the callback has cut work short since the state was last status."""
@@ -179,7 +169,7 @@ class SearchRun:
     def _belongs(self) -> dict[str, Any]:
         """All data that determine the run, except the seed: a checkpoint with other data is refused."""
         start = None if self.start is None else {"shape": self.start.shape, "hash": hashlib.sha256(self.start.tobytes()).hexdigest()}
-        return {**self.what, "evaluations": self.budget, "tolerance": self.evaluator.tolerance, "start": start}
+        return {**self.what, "evaluations": self.call.evaluations, "tolerance": self.evaluator.tolerance, "start": start}
 
     def _asked_to_stop(self) -> bool:
         """Whether the work is asked to end; also refreshes the display between long solves."""
@@ -191,7 +181,7 @@ class SearchRun:
         return costs(
             counts,
             wall_time=self._interrupts.elapsed,
-            seed=self.seed,
+            seed=self._seed,
             tolerance=self.evaluator.tolerance,
             stopped=stopped,
             reproducible=stopped in ENDED and not counts.clocked and not (checkpoint and checkpoint.mixed),
@@ -202,13 +192,13 @@ class SearchRun:
     def _progress(self) -> Progress:
         counts = self.evaluator.counts
         archived = len(self._state.archive) if self._state is not None else 0
-        best = self._state.archive.F.min(axis=0) if archived else ()
+        best, goals = (self._state.archive.F.min(axis=0), self.evaluator.goals) if archived else ((), ())
         return Progress(
             evaluations=counts.evaluations,
-            budget=self.budget,
+            budget=self.call.evaluations,
             elapsed=self._interrupts.elapsed,
             archive=archived,
-            ideal={goal.name: float(goal.sign * value) for goal, value in zip(self.goals() if archived else (), best, strict=False)},
+            ideal={goal.name: float(goal.sign * value) for goal, value in zip(goals, best, strict=False)},
             failures=dict(counts.failures),
             make_front=lambda: self.make_front(self._state, self._stats("running")),
             F=self._state.archive.F if self._state is not None else np.empty((0, 0)),

@@ -6,7 +6,7 @@ import importlib
 import inspect
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from os import PathLike
 from typing import Any
 
@@ -34,7 +34,7 @@ from ..refinement.mesh_search import search_meshes
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
-from .start import beginning, check_run, check_start, decisions, drawing
+from .start import Call, beginning, check_start, decisions, drawing
 
 log = logging.getLogger(__name__)
 
@@ -149,59 +149,59 @@ class Solver(SearchMethod):
         of None takes the seed of the file. `time_limit` counts from each call; `stats["wall_time"]` is the sum of all calls. If the file
         cannot be written during the run, the search continues, logs a warning, and `stats["checkpoint"]` has the reason.
         """
+        vector = isinstance(problem, VectorProblem | CompiledVectorProblem)
+        if vector and not (transcription is None and inner is None):
+            raise ValueError(f"{without_dynamics(problem.name)}: it takes no {'inner level' if transcription is None else 'transcription'}")
+        if not vector:
+            check_problem(problem, transcription)
+        call = Call(self._budget(problem, evaluations), seed, tolerance, time_limit, progress, callback, checkpoint)
+        check_verify(verify)
         if isinstance(problem, VectorProblem | CompiledVectorProblem):
-            for name, given in {"transcription": transcription, "inner level": inner}.items():
-                if given is not None:
-                    raise ValueError(f"{without_dynamics(problem.name)}: it takes no {name}")
-            return self._solve_vector(problem, evaluations, seed, tolerance, start, verify, time_limit, progress, callback, checkpoint)
-        check_problem(problem, transcription)
-        evaluations = self._budget(problem, evaluations)
+            return self._solve_vector(problem.compile(), start, verify, call)
         if isinstance(problem, Problem):
             inner, start = problem.default_inner if inner is None else inner, problem.default_start if start is None else start
-        else:
-            inner = "auto" if inner is None else inner
-        check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
-        check_verify(verify)
-        solver = inner_solver(inner)
-        compiled = problem.compile() if isinstance(problem, Problem) else problem
+        return self._solve(problem, transcription, "auto" if inner is None else inner, start, verify, call)
+
+    def _solve(
+        self,
+        problem: Problem | CompiledProblem,
+        transcription: Transcription | None,
+        inner: str | InnerSolver,
+        start: Any,
+        verify: float | None,
+        call: Call,
+    ) -> Front:
+        """`solve` of an optimal control problem."""
+        solver, compiled = inner_solver(inner), problem.compile()
         self.check_goals(compiled.goals)
         check_start(start, compiled)
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
         earlier, chosen = Counts(), None
-        with Interrupts(time_limit) as interrupts, numbers_may_blow_up():
+        with Interrupts(call.time_limit) as interrupts, numbers_may_blow_up():
             try:
                 if transcription is None:
-                    with StatusLine(progress) as show:
-                        chosen = search_meshes(problem, verify or VERIFY, float(tolerance), show)
+                    with StatusLine(call.progress) as show:
+                        chosen = search_meshes(problem, verify or VERIFY, call.tolerance, show)
                     earlier = chosen.counts
                     transcription = chosen.search if self.remeshes else chosen.fine or chosen.search
                     start = chosen.ends if start is None and self.remeshes else start
-                run = self._search_run(compiled, transcription, solver, level, evaluations, seed, float(tolerance), start)
+                run = self._search_run(compiled, transcription, solver, level, start, replace(call, time_limit=None))
             except Stopped as reason:
-                costs_so_far = costs(
-                    earlier, wall_time=interrupts.elapsed, seed=seed, tolerance=tolerance, stopped=str(reason), reproducible=False
-                )
-                return Front.of(no_points(compiled.goals, compiled, about, costs_so_far | level))
+                spent = {"wall_time": interrupts.elapsed, "seed": call.seed, "tolerance": call.tolerance}
+                stats = costs(earlier, **spent, stopped=str(reason), reproducible=False)
+                return Front.of(no_points(compiled.goals, compiled, about, stats | level))
             before = interrupts.elapsed
-            front = run.go(None, progress, callback, checkpoint)
+            front = run.go()
             front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
             try:
-                return self.finish(front, verify, progress, chosen) if front.stats["stopped"] in ENDED else front.verify(verify)
+                return self.finish(front, verify, call.progress, chosen) if front.stats["stopped"] in ENDED else front.verify(verify)
             except Stopped as reason:
                 return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
             except Exception as error:
                 return _not_simulated(front, error)
 
     def _search_run(
-        self,
-        problem: CompiledProblem,
-        transcription: Transcription,
-        inner: InnerSolver,
-        level: dict[str, str],
-        evaluations: int | None,
-        seed: int | None,
-        tolerance: float,
-        start: Any,
+        self, problem: CompiledProblem, transcription: Transcription, inner: InnerSolver, level: dict[str, str], start: Any, call: Call
     ) -> SearchRun:
         """The run of a search on an optimal control problem, ready to go."""
         nlp = inner.program(transcription.nlp(problem))
@@ -209,7 +209,8 @@ class Solver(SearchMethod):
         check_freedom(nlp)
         self.check_objectives(len(problem.goals))
         about, drawn = self.about(), drawing(start)
-        evaluator = Bilevel(nlp, inner, tolerance, drawn if isinstance(drawn, Smooth) else None)
+        smooth = drawn if isinstance(drawn, Smooth) else None
+        evaluator = Bilevel(nlp, inner, call.tolerance, smooth)
         certified = self.certifies and evaluator.has_gradients
 
         def make_front(state: Any, stats: dict[str, Any]) -> Front:
@@ -217,22 +218,15 @@ class Solver(SearchMethod):
                 return Front.of(no_points(problem.goals, problem, about, stats | level))
             return Front.of(from_archive(nlp, state.archive, state.closest, about, stats | level, certify=certified))
 
-        return SearchRun(
-            self,
-            evaluator,
-            goals=lambda: problem.goals,
-            make_front=make_front,
-            budget=evaluations,
-            seed=seed,
-            start=beginning(start if drawn is None else None, nlp, guess=drawn.guess if isinstance(drawn, Smooth) else drawn is None),
-            what={
-                "solver": about,
-                "problem": {"name": problem.name, "fingerprint": problem.fingerprint},
-                "transcription": transcription.to_dict(),
-                "first candidates": asdict(drawn) if isinstance(drawn, Smooth) else drawn,
-                **level,
-            },
-        )
+        first = beginning(start if drawn is None else None, nlp, guess=drawn is None if smooth is None else smooth.guess)
+        what = {
+            "solver": about,
+            "problem": {"name": problem.name, "fingerprint": problem.fingerprint},
+            "transcription": transcription.to_dict(),
+            "first candidates": drawn if smooth is None else asdict(smooth),
+            **level,
+        }
+        return SearchRun(self, evaluator, make_front, call, first, what)
 
     def minimize(
         self,
@@ -281,20 +275,14 @@ class Solver(SearchMethod):
         OSError
             If the checkpoint cannot be written; before any work.
         """
-        evaluations = self._budget(None, evaluations)
-        check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
+        call = Call(self._budget(None, evaluations), seed, tolerance, time_limit, progress, callback, checkpoint)
         problem = plain_problem(function, bounds, constraints=constraints, names=names, units=units, senses=senses)
         what = {
             "bounds": {v.name: (v.lower, v.upper) for v in problem.variables},
-            "objectives": {
-                "number": len(problem.goals) or None,
-                "names": names,
-                "units": units,
-                "senses": senses,
-            },
+            "objectives": {"number": len(problem.goals) or None, "names": names, "units": units, "senses": senses},
             "constraints": constraints is not None,
         }
-        return self._vector_run(problem, evaluations, seed, float(tolerance), start, what).go(time_limit, progress, callback, checkpoint)
+        return self._search_vector(problem, start, call, what)
 
     def _budget(self, problem: Any, evaluations: int | None) -> int | None:
         """The number of evaluations that is given, or the problem's own; None if the search needs none. Raises ValueError if it does."""
@@ -309,40 +297,22 @@ class Solver(SearchMethod):
             )
         return own
 
-    def _solve_vector(
-        self,
-        problem: VectorProblem | CompiledVectorProblem,
-        evaluations: int | None,
-        seed: int | None,
-        tolerance: float,
-        start: Any,
-        verify: float | None,
-        time_limit: float | None,
-        progress: bool | None,
-        callback: Callback | None,
-        checkpoint: str | PathLike[str] | None,
-    ) -> Front:
+    def _solve_vector(self, problem: CompiledVectorProblem, start: Any, verify: float | None, call: Call) -> Front:
         """`solve` of a vector problem, each point of whose front is evaluated again in the end."""
-        evaluations = self._budget(problem, evaluations)
-        check_run(evaluations, seed, tolerance, time_limit, callback, checkpoint)
-        check_verify(verify)
-        drawn, compiled = drawing(start), problem.compile()
+        drawn = drawing(start)
         if isinstance(drawn, Smooth):
-            raise ValueError(f"start: {without_dynamics(compiled.name)}, so there are no smooth profiles")
-        self.check_vector(compiled)
-        what = {"problem": {"name": compiled.name, "fingerprint": compiled.fingerprint}}
-        run = self._vector_run(compiled, evaluations, seed, float(tolerance), None if drawn else start, what)
-        front = run.go(time_limit, progress, callback, checkpoint)
+            raise ValueError(f"start: {without_dynamics(problem.name)}, so there are no smooth profiles")
+        self.check_vector(problem)
+        what = {"problem": {"name": problem.name, "fingerprint": problem.fingerprint}}
+        front = self._search_vector(problem, None if drawn else start, call, what)
         try:
             return Front.of(with_nearest(front)).verify(verify)
         except Exception as error:
             return _not_simulated(front, error)
 
-    def _vector_run(
-        self, problem: CompiledVectorProblem, evaluations: int | None, seed: int | None, tolerance: float, start: Any, what: dict[str, Any]
-    ) -> SearchRun:
-        """The run of a search on a vector problem, ready to go; `what` says for its checkpoint which problem that is."""
-        box, about = BlackBox(problem, tolerance), self.about()
+    def _search_vector(self, problem: CompiledVectorProblem, start: Any, call: Call, what: dict[str, Any]) -> Front:
+        """The front of a vector problem as a search leaves it; `what` says for its checkpoint which problem that is."""
+        box, about = BlackBox(problem, call.tolerance), self.about()
         if problem.goals:
             self.check_objectives(len(problem.goals))
             self.check_goals(problem.goals)
@@ -353,16 +323,8 @@ class Solver(SearchMethod):
                 return Front.of(no_points(() if box.m_known is None else box.goals, named, about, stats))
             return Front.of(from_vector_problem(problem, state.archive, state.closest, box.goals, about, stats))
 
-        return SearchRun(
-            self,
-            box,
-            goals=lambda: box.goals,
-            make_front=make_front,
-            budget=evaluations,
-            seed=seed,
-            start=None if start is None else decisions(start, problem.variables),
-            what={"solver": about, **what},
-        )
+        first = None if start is None else decisions(start, problem.variables)
+        return SearchRun(self, box, make_front, call, first, {"solver": about, **what}).go()
 
 
 def _not_simulated(front: Front, error: Exception) -> Front:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
@@ -18,6 +19,7 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..gradients.multistart import guessed_start
 from ..io.atomic import check_target
+from .progress import Progress
 
 STARTS = ("uniform", "smooth")
 """Words for the way first candidates are drawn."""
@@ -26,21 +28,37 @@ STARTS = ("uniform", "smooth")
 OTHER = "start: the points have other variables; a start belongs to one problem, with these data or others"
 
 
-def check_run(evaluations: Any, seed: Any, tolerance: Any, time_limit: Any, callback: Any, checkpoint: Any) -> None:
-    """Raise ValueError for arguments of `solve` or `minimize` that are not valid, OSError for a checkpoint that cannot be written."""
-    if evaluations is not None:
-        check_count("evaluations", evaluations, 1)
-    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
-        raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
-    check_positive("tolerance", tolerance)
-    if time_limit is not None:
-        check_positive("time_limit", time_limit)
-    if callback is not None and not callable(callback):
-        raise ValueError(f"callback must be callable, not {callback!r}")
-    if checkpoint is not None:
-        if not isinstance(checkpoint, str | PathLike) or not str(checkpoint):
-            raise ValueError(f"checkpoint must be a path, not {checkpoint!r}")
-        check_target(checkpoint)
+@dataclass(frozen=True)
+class Call:
+    """The arguments that `Solver.solve`, `Solver.minimize` and gradient tools share, checked; see `Solver.solve`.
+
+    Raises ValueError for one that is not valid, OSError for a checkpoint that cannot be written.
+    """
+
+    evaluations: int | None
+    seed: int | None
+    tolerance: float
+    time_limit: float | None
+    progress: bool | None = None
+    callback: Callable[[Progress], Any] | None = None
+    checkpoint: str | PathLike[str] | None = None
+
+    def __post_init__(self) -> None:
+        if self.evaluations is not None:
+            check_count("evaluations", self.evaluations, 1)
+        seed, checkpoint = self.seed, self.checkpoint
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
+            raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
+        check_positive("tolerance", self.tolerance)
+        object.__setattr__(self, "tolerance", float(self.tolerance))
+        if self.time_limit is not None:
+            check_positive("time_limit", self.time_limit)
+        if self.callback is not None and not callable(self.callback):
+            raise ValueError(f"callback must be callable, not {self.callback!r}")
+        if checkpoint is not None:
+            if not isinstance(checkpoint, str | PathLike) or not str(checkpoint):
+                raise ValueError(f"checkpoint must be a path, not {checkpoint!r}")
+            check_target(checkpoint)
 
 
 def drawing(start: Any) -> Smooth | str | None:

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
+from damage import damaged
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -337,31 +338,6 @@ def test_a_file_cut_anywhere_is_refused(tmp_path):
             ValueError, match=r"front\.nc does not hold a front that can be read: it is (empty|not a netCDF-4 file|cut short)"
         ):
             Front.load(path)
-
-
-def damaged(whole: bytes, rng: np.random.Generator) -> bytes:
-    """A file's content with some of it changed, lost, repeated, swapped or added."""
-    content, n = bytearray(whole), len(whole)
-    start, length = int(rng.integers(n)), int(rng.integers(1, min(n, 5000)))
-    match int(rng.integers(6)):
-        case 0:
-            content[start] ^= int(rng.integers(1, 256))
-        case 1:
-            del content[start:]
-        case 2:
-            content[start : start + length] = bytes(len(content[start : start + length]))
-        case 3:
-            content[start:start] = content[start : start + length]
-        case 4:
-            other = int(rng.integers(n))
-            (first, second), length = sorted((start, other)), min(length, abs(start - other), n - max(start, other))
-            content[first : first + length], content[second : second + length] = (
-                content[second : second + length],
-                content[first : first + length],
-            )
-        case 5:
-            content += rng.bytes(length)
-    return bytes(content)
 
 
 def test_damage_is_refused_in_one_line(tmp_path):

@@ -95,19 +95,8 @@ def file(tmp_path: Path) -> Path:
 # Going on
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("iterations", [0, 5])
-def test_a_black_box_goes_on_to_the_same_bits(file, iterations) -> None:
-    part = minimize(checkpoint=file, callback=after(iterations))
-    assert part.stats["stopped"] == "callback" and part.stats["evaluations"] < 400
-    counted = Counted()
-    rest = minimize(checkpoint=file, f=counted)
-    assert counted.rows == 400 - part.stats["evaluations"]
-    assert_same(rest, uninterrupted())
-    assert rest.stats["wall_time"] > part.stats["wall_time"]
-
-
-BASELINES = [
+SOLVERS = [
+    SMALL,
     NSGA2(population=12),
     NSGA3(divisions=11),
     MOEAD(divisions=11),
@@ -121,35 +110,36 @@ BASELINES = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", BASELINES, ids=str)
+@pytest.mark.parametrize("solver", SOLVERS, ids=str)
 @pytest.mark.parametrize("constraints", [None, lambda X: 0.5 - X[:, :1]], ids=["free", "constrained"])
-def test_baselines_go_on_to_the_same_bits(file, solver, constraints) -> None:
+def test_a_black_box_goes_on_to_the_same_bits(file, solver, constraints) -> None:
     given = {"evaluations": 150, "constraints": constraints}
     whole = minimize(solver, **given)
     for iterations in (0, 2):
         counted = Counted()
         stopped = minimize(solver, f=counted, checkpoint=file, callback=after(iterations), **given)
-        assert stopped.stats["stopped"] == "callback"
+        assert stopped.stats["stopped"] == "callback" and stopped.stats["evaluations"] == counted.rows
         resumed = Counted()
-        assert_same(minimize(solver, f=resumed, checkpoint=file, **given), whole)
-        assert counted.rows + resumed.rows == 150
+        rest = minimize(solver, f=resumed, checkpoint=file, **given)
+        assert_same(rest, whole)
+        assert counted.rows + resumed.rows == 150 and rest.stats["wall_time"] > stopped.stats["wall_time"]
         file.unlink()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", [MOPSO(particles=6)], ids=str)
-def test_baselines_go_on_with_a_trajectory_problem(file, solver) -> None:
-    solve(solver, 30, checkpoint=file, callback=after(1))
-    assert_same(solve(solver, 30, checkpoint=file), solve(solver, 30))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("refine", [True, False])
-def test_a_trajectory_problem_goes_on_to_the_same_bits(file, refine) -> None:
-    solver = MACS(agents=4, archive=6, refine=refine, variant=Variant(refine_every=25))
-    part = solve(solver, checkpoint=file, callback=after(4))
-    assert part.stats["stopped"] == "callback" and bool(part.stats["gradient_solves"]) == refine
-    assert_same(solve(solver, checkpoint=file), solve(solver))
+@pytest.mark.parametrize(
+    ("solver", "evaluations", "iterations"),
+    [
+        (MACS(agents=4, archive=6, variant=Variant(refine_every=25)), 160, 4),
+        (MACS(agents=4, archive=6, refine=False), 160, 4),
+        (MOPSO(particles=6), 30, 1),
+    ],
+    ids=str,
+)
+def test_a_trajectory_problem_goes_on_to_the_same_bits(file, solver, evaluations, iterations) -> None:
+    part = solve(solver, evaluations, checkpoint=file, callback=after(iterations))
+    assert part.stats["stopped"] == "callback" and bool(part.stats["gradient_solves"]) == getattr(solver, "refine", False)
+    assert_same(solve(solver, evaluations, checkpoint=file), solve(solver, evaluations))
 
 
 def test_a_checkpoint_changes_no_bit(file, monkeypatch) -> None:
@@ -240,17 +230,6 @@ def test_interrupted_within_the_last_solve(file, monkeypatch) -> None:
     assert np.array_equal(front.F, solved().F)
     assert all(point.optimality is None for point in front), "who interrupts does not want to wait for certificates"
     assert_same(solve(checkpoint=file), solved())
-
-
-@pytest.mark.slow
-def test_interrupted_in_the_polish_of_a_search_that_is_stuck(file, monkeypatch) -> None:
-    solver = Stuck(agents=4, archive=6, polish_every=4)
-    with monkeypatch.context() as patch:
-        Solving(patch, 3, press)
-        assert solve(solver, checkpoint=file).stats["stopped"] == "interrupted"
-    front = solve(solver, checkpoint=file)
-    assert front.stats["stopped"] == "idle"
-    assert_same(front, solve(solver))
 
 
 @pytest.mark.slow
@@ -461,34 +440,28 @@ def test_a_function_of_other_objectives_is_refused(file) -> None:
 # Files that are refused
 
 
-FORGED = {
-    "no field": (lambda state: state.pop("repairs"), "Object missing required field `repairs`"),
-    "rank": (lambda state: state["archive"].update(F=plain(np.zeros(3))), "state.archive.F is an array .* with 1 dim.* 2 exp"),
-    "rows": (lambda state: state["agents"].update(Z=plain(np.zeros((2, 5)))), "state.agents.F has . rows, 2 expected"),
-    "length": (lambda state: state.update(ideal=plain(np.zeros(3))), "state.ideal has 3 rows, 2 expected"),
-    "precision": (lambda state: state.update(nadir=plain(np.zeros(2, np.float32))), "state.nadir is an array of float32"),
-    "full vectors": (lambda state: state["archive"].update(Z=plain(np.zeros((6, 4)))), "state.archive.Z has 4 columns, 5 exp"),
-    "row": (
-        lambda state: state["agents"].update(direction=plain(np.full(4, 10**6))),
-        "state.agents.direction has numbers outside of the .* rows of state.directions",
-    ),
-    "generator": (lambda state: state.update(rng="3"), "no generator: .* - at `[$].rng`"),
-}
+FORGED: list[tuple[str, dict[str, Any], str]] = [
+    ("archive", {"F": plain(np.zeros(3))}, "state.archive.F is an array .* with 1 dim.* 2 exp"),
+    ("agents", {"Z": plain(np.zeros((2, 5)))}, "state.agents.F has . rows, 2 expected"),
+    ("", {"ideal": plain(np.zeros(3))}, "state.ideal has 3 rows, 2 expected"),
+    ("", {"nadir": plain(np.zeros(2, np.float32))}, "state.nadir is an array of float32"),
+    ("archive", {"Z": plain(np.zeros((6, 4)))}, "state.archive.Z has 4 columns, 5 exp"),
+    ("agents", {"direction": plain(np.full(4, 10**6))}, "state.agents.direction has numbers outside of the .* rows of state.directions"),
+    ("", {"rng": "3"}, "no generator: .* - at `[$].rng`"),
+]
 
 
-@pytest.mark.parametrize("kind", FORGED)
-def test_a_forged_file_is_refused_by_the_name_of_the_field(file, kind) -> None:
-    change, message = FORGED[kind]
+@pytest.mark.parametrize(("part", "changes", "message"), FORGED)
+def test_a_forged_file_is_refused_by_the_name_of_the_field(file, part, changes, message) -> None:
     minimize(checkpoint=file, callback=after(2))
     document = msgspec.msgpack.decode(checkpoint.read_file(file))
     state = msgspec.msgpack.decode(document["state"])
-    change(state)
+    (state[part] if part else state).update(changes)
     content = checkpoint.sealed(msgspec.msgpack.encode(document | {"state": msgspec.msgpack.encode(state)}))
     file.write_bytes(content)
-    counted = Counted()
     with pytest.raises(ValueError, match=f"run.ckpt' cannot be continued by this MACS: {message}[^\n]*; it was left as it is"):
-        minimize(checkpoint=file, f=counted)
-    assert counted.rows == 0 and file.read_bytes() == content
+        minimize(checkpoint=file, f=lambda X: pytest.fail("evaluated"))
+    assert file.read_bytes() == content
 
 
 @pytest.mark.parametrize(
@@ -507,13 +480,6 @@ def test_places_that_cannot_be_written(tmp_path, where, error, message) -> None:
     with pytest.raises(error, match=message):
         solve(checkpoint=str(tmp_path / where))
     assert counted.rows == 0
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_without_permission(tmp_path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(PermissionError, match="is not writable"):
-        minimize(checkpoint=tmp_path / "run.ckpt")
 
 
 @pytest.mark.slow
@@ -537,6 +503,3 @@ def test_a_full_disk_loses_neither_the_search_nor_the_last_checkpoint(file, monk
     counted = Counted()
     assert_same(minimize(checkpoint=file, f=counted), uninterrupted())
     assert 0 < counted.rows < 400
-
-
-# Other solvers
