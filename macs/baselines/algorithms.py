@@ -278,10 +278,8 @@ class NSGA3(DirectedGenetic):
     divisions : int, optional
         Divisions of the simplex lattice (Das and Dennis 1998) of reference directions. With `population`, there may be fewer directions
         than individuals, but at least half as many. Default: the finest lattice with at most 100 directions (2 objectives: 100, 3: 91).
-    crossover : float, default 1
-        Probability of simulated binary crossover, in [0, 1].
-    crossover_eta, mutation_eta : float, default 30 and 20
-        Distribution indices of crossover and of polynomial mutation, in [1, 100]; a higher index puts children nearer to their parents.
+    crossover, crossover_eta, mutation_eta : float, default 1, 30 and 20
+        As for `NSGA2`.
     handling, penalty, degree
         As for `NSGA2`. With "objective", the directions have one objective more.
     whole : bool, default False
@@ -475,7 +473,7 @@ class MOEAD(Directed):
     batch : bool, default False
         Evaluate all offspring of a generation in one batch, and do the replacement afterwards (pymoo's ParallelMOEAD).
     crossover_eta, mutation_eta : float, default 20
-        Distribution indices of simulated binary crossover and of polynomial mutation, in [1, 100].
+        As for `NSGA2`.
     handling, penalty, degree
         As for `NSGA3`, errors included.
 

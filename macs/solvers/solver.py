@@ -149,11 +149,10 @@ class Solver(SearchMethod):
         of None takes the seed of the file. `time_limit` counts from each call; `stats["wall_time"]` is the sum of all calls. If the file
         cannot be written during the run, the search continues, logs a warning, and `stats["checkpoint"]` has the reason.
         """
-        vector = isinstance(problem, VectorProblem | CompiledVectorProblem)
-        if vector and not (transcription is None and inner is None):
-            raise ValueError(f"{without_dynamics(problem.name)}: it takes no {'inner level' if transcription is None else 'transcription'}")
-        if not vector:
+        if not isinstance(problem, VectorProblem | CompiledVectorProblem):
             check_problem(problem, transcription)
+        elif transcription is not None or inner is not None:
+            raise ValueError(f"{without_dynamics(problem.name)}: it takes no {'inner level' if transcription is None else 'transcription'}")
         call = Call(self._budget(problem, evaluations), seed, tolerance, time_limit, progress, callback, checkpoint)
         check_verify(verify)
         if isinstance(problem, VectorProblem | CompiledVectorProblem):

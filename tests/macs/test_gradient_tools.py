@@ -263,5 +263,8 @@ def test_targets_are_even_and_no_more_than_asked() -> None:
 
 
 def test_importing_stays_light() -> None:
-    code = "import sys, macs; print([m for m in ('matplotlib', 'xarray', 'scipy.stats') if m in sys.modules])"
+    code = (
+        "import sys; from macs import *; NSGA3(divisions=4), SMSEMOA(), RVEA(), CTAEA();"
+        "print([m for m in ('matplotlib', 'xarray', 'scipy.stats', 'pymoo') if m in sys.modules])"
+    )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"

