@@ -22,7 +22,10 @@ from .fronts.provenance import more_costs, versions
 from .gradient_solvers import GradientSolver
 from .gradient_tools import AUTO, Terms, check_starts, sweep
 from .gradients.scalarised import MOST_ITERATIONS
-from .preferences import FuzzySatisfactory, Preference, Ranges, from_dict, to_dict
+from .preferences.catalogue import from_dict, to_dict
+from .preferences.goals import FuzzySatisfactory
+from .preferences.preference import Preference
+from .preferences.ranges import Ranges
 
 KEYS = ("method", "settings", "vary", "loop")
 """Of a choice as plain data."""

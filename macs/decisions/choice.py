@@ -13,8 +13,8 @@ from problems.compiled import Objective
 
 from ..fronts.point import Point
 from ..io.text import html_block, html_table, text_table
-from ..preferences import Preference, Ranges
-from ..preferences.ranges import confidence
+from ..preferences.preference import Preference
+from ..preferences.ranges import Ranges, confidence, sense_and_unit
 from ..preferences.stage import ordering
 from .trade_offs import TradeOffs, trade_offs
 
@@ -78,12 +78,11 @@ class Choice:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> problem = problems.load("goddard")
+    >>> front = macs.sweep(problem, points=3, starts=1)
     >>> from macs.decisions import ReferencePoint, decide
-    >>> choice = decide(load("goddard"), ReferencePoint({"flight time": 180.0}), start=front, starts=1)
+    >>> choice = decide(problem, ReferencePoint({"flight time": 180.0}), start=front, starts=1)
     >>> sorted(choice.objectives)
     ['flight time', 'horizontal speed']
     """
@@ -101,9 +100,9 @@ class Choice:
     def of(cls, point: Point, preference: Preference, ranges: Ranges, message: str = "") -> Choice:
         """A point that is known, judged by a preference."""
         J = np.array([[*point.objectives.values()]])
-        found = ordering(preference.stages(point.goals, ranges), J, confidence(point.alone()))
+        _, values = ordering(preference.stages(point.goals, ranges), J, confidence(point.alone()))
         degrees = dict(zip(point.objectives, preference.degrees(point.goals, ranges, J)[0].tolist(), strict=True))
-        return cls(point, tuple(np.nan_to_num(found.values[0], posinf=np.inf).tolist()), degrees, (), preference, ranges, message)
+        return cls(point, tuple(np.nan_to_num(values[0], posinf=np.inf).tolist()), degrees, (), preference, ranges, message)
 
     @property
     def value(self) -> float:
@@ -136,37 +135,28 @@ class Choice:
 
     def table(self) -> str:
         """The choice as plain text: each objective with its range and its degree, the steps, and the message."""
-        goals, chosen = self.point.goals, self.point.objectives
-        ends = [[f"{side[goal.name]:.6g}" for goal in goals] for side in (self.ranges.best, self.ranges.worst)]
-        columns = [
-            [goal.name for goal in goals],
-            [f"{goal.sense[:3]} [{goal.unit or '-'}]" for goal in goals],
-            [f"{value:.6g}" for value in chosen.values()],
-            *ends,
-            [degree_text(self.degrees[goal.name]) for goal in goals],
-        ]
-        titles = ["objective", "", "chosen", "best", "worst", "degree"]
-        lines = [repr(self.preference), "", text_table([titles], list(zip(*columns, strict=True)), [True, True, *[False] * 4])]
-        lines += ["", *self._steps(goals)]
+        lines = [repr(self.preference), "", self.degrees_table(), ""]
+        if self.history:
+            about = list(dict.fromkeys(name for step in self.history for name in step.about))
+            heads = {"step": [step.name for step in self.history], "status": [step.status for step in self.history]}
+            heads["value"] = [f"{step.value:.6g}" for step in self.history]
+            heads |= {name: [f"{step.about[name]:.6g}" if name in step.about else "-" for step in self.history] for name in about}
+            lines += [choices_table(self.point.goals, heads, self.history)]
+            lines += [f"{step.name}: {step.message}" for step in self.history if step.message]
         return "\n".join([*lines, *(["", self.message] if self.message else [])])
 
-    def _steps(self, goals: Sequence[Objective]) -> list[str]:
-        about = list(dict.fromkeys(name for step in self.history for name in step.about))
-        titles = ["step", "status", "value", *about, *(goal.name for goal in goals), *["degree"] * len(goals)]
-        units = [*[""] * (3 + len(about)), *(f"[{goal.unit or '-'}]" for goal in goals), *(goal.name for goal in goals)]
+    def degrees_table(self) -> str:
+        """Each objective with its range and its degree, as plain text."""
+        ranges, J = self.ranges, self.objectives
         rows = [
             [
-                step.name,
-                step.status,
-                f"{step.value:.6g}",
-                *(f"{step.about[name]:.6g}" if name in step.about else "-" for name in about),
-                *(f"{step.objectives[goal.name]:.6g}" for goal in goals),
-                *(degree_text(step.degrees[goal.name]) for goal in goals),
+                *(goal.name, sense_and_unit(goal)),
+                *(f"{value:.6g}" for value in (J[goal.name], ranges.best[goal.name], ranges.worst[goal.name])),
+                degree_text(self.degrees[goal.name]),
             ]
-            for step in self.history
+            for goal in self.point.goals
         ]
-        said = [f"{step.name}: {step.message}" for step in self.history if step.message]
-        return [text_table([titles, units], rows, [True, True, *[False] * (len(titles) - 2)]), *said] if rows else []
+        return text_table([["objective", "", "chosen", "best", "worst", "degree"]], rows, [True, True, *[False] * 4])
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +185,21 @@ class Turn:
     preference: Preference
     choice: Choice | None = None
     alternatives: tuple[Choice, ...] = ()
+
+
+def choices_table(goals: Sequence[Objective], heads: Mapping[str, Sequence[str]], rows: Sequence[Choice | Step | None]) -> str:
+    """A row for each choice or step as plain text: the cells under each head, then its objectives and their degrees."""
+    titles = [*heads, *(goal.name for goal in goals), *["degree"] * len(goals)]
+    units = [*[""] * len(heads), *map(sense_and_unit, goals), *(goal.name for goal in goals)]
+    cells = [
+        [
+            *own,
+            *("-" if one is None else f"{one.objectives[goal.name]:.6g}" for goal in goals),
+            *("-" if one is None else degree_text(one.degrees[goal.name]) for goal in goals),
+        ]
+        for one, *own in zip(rows, *heads.values(), strict=True)
+    ]
+    return text_table([titles, units], cells, [title in ("step", "status", "asked") for title in titles])
 
 
 def degree_text(degree: float) -> str:

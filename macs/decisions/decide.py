@@ -18,7 +18,10 @@ from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..gradient_tools import Terms
 from ..gradients.scalarised import MOST_ITERATIONS
-from ..preferences import FuzzySatisfactory, Preference, Ranges, Stage
+from ..preferences.goals import FuzzySatisfactory
+from ..preferences.preference import Preference
+from ..preferences.ranges import Ranges
+from ..preferences.stage import Stage
 from .choice import Choice
 from .solver import DecisionSolver
 
@@ -76,13 +79,12 @@ def decide(
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> problem = problems.load("goddard")
+    >>> front = macs.sweep(problem, points=3, starts=1)
     >>> from macs.decisions import ReferencePoint, decide
-    >>> choice = decide(load("goddard"), ReferencePoint({"flight time": 180.0}), start=front, starts=1)
-    >>> print(choice.point.verified)
+    >>> choice = decide(problem, ReferencePoint({"flight time": 180.0}), start=front, starts=1)
+    >>> choice.point.verified
     True
     """
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
@@ -131,13 +133,12 @@ def satisfy(
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> problem = problems.load("goddard")
+    >>> front = macs.sweep(problem, points=3, starts=1)
     >>> from macs.decisions import FuzzySatisfactory, satisfy
     >>> goals = FuzzySatisfactory({}, priorities=["horizontal speed", "flight time"])
-    >>> choice = satisfy(load("goddard"), DFET(6, 6, basis="bernstein"), goals, start=front, starts=1)
+    >>> choice = satisfy(problem, goals, start=front, starts=1)
     >>> choice.degrees["horizontal speed"] > 0
     True
     """

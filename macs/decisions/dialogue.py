@@ -23,13 +23,14 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..io.atomic import check_target
-from ..io.text import counted, text_table
-from ..preferences import Preference, Ranges, to_dict
-from ..preferences import from_dict as preference_from_dict
-from ..preferences.ranges import confidence, shown
-from .choice import Choice, Turn, degree_text
+from ..io.text import counted
+from ..preferences.catalogue import from_dict as preference_from_dict
+from ..preferences.catalogue import to_dict
+from ..preferences.preference import Preference
+from ..preferences.ranges import Ranges, confidence, shown
+from .choice import Choice, Turn, choices_table
 from .decide import decide
-from .dialogue_file import FILE_VERSION, FORMAT, ChoiceRecord, DialogueRecord, TurnRecord, finite, packed, read, readable, write
+from .dialogue_file import FILE_VERSION, FORMAT, ChoiceRecord, DialogueRecord, TurnRecord, packed, read, readable, write
 from .improving import around, improved, neutral
 
 if TYPE_CHECKING:
@@ -70,10 +71,8 @@ class Dialogue:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> front = macs.sweep(problems.load("goddard"), points=3, starts=1)
     >>> from macs.decisions import Dialogue, ReferencePoint
     >>> dialogue = Dialogue(front)  # without the problem, points are ranked
     >>> choice = dialogue.prefer(ReferencePoint({"flight time": 180.0}))
@@ -174,13 +173,21 @@ class Dialogue:
         preference.stages(self.goals, self.ranges)
         self.history = (*self.history, Turn(asked or preference.words, preference))
 
-    def choose(self) -> Choice:
-        """The choice by what is asked for at present; made once."""
+    def choose(self, preference: Preference | None = None, asked: str | None = None) -> Choice:
+        """The choice by what is asked for at present, made once; or by a preference that is asked for now, as by `prefer`."""
+        before = self.history
+        if preference is not None:
+            self.prefer(preference, asked)
         turn = self.history[-1] if self.history else Turn("near the best of all", self.preference)
         if turn.choice is None:
-            self.history = (*self.history[:-1], replace(turn, choice=self._chosen(turn.preference)))
-        assert self.choice is not None
-        return self.choice
+            try:
+                turn = replace(turn, choice=self._chosen(turn.preference))
+            except BaseException:
+                self.history = before
+                raise
+            self.history = (*self.history[:-1], turn)
+        assert turn.choice is not None
+        return turn.choice
 
     def improve(self, name: str, to: float | None = None, giving: Mapping[str, float] | None = None) -> Choice:
         """The choice where one objective is better than in the present choice, which stays in the history.
@@ -203,13 +210,8 @@ class Dialogue:
             For unknown names, a value that is not better than the present one or lies beyond its range, and limits that are not worse.
         """
         now = self.choose()
-        before = self.history
-        self.prefer(improved(self.preference, self.ranges, now.point, name, to, giving), self._asked(name, to, giving or {}))
-        try:
-            return self.choose()
-        except BaseException:
-            self.history = before
-            raise
+        wanted = improved(self.preference, self.ranges, now.point, name, to, giving)
+        return self.choose(wanted, self._asked(name, to, giving or {}))
 
     def alternatives(self, k: int = 4) -> tuple[Choice, ...]:
         """Up to k other choices about the present one, judged by what is asked for at present. `take` makes one of them the present one.
@@ -235,10 +237,7 @@ class Dialogue:
     def take(self, number: int) -> Choice:
         """Make one of the `alternatives`, counted from 1, the present choice.
 
-        Raises
-        ------
-        ValueError
-            If there is none of that number.
+        Raises ValueError if there is none of that number.
         """
         there = self.alternatives_found
         if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 1 <= number <= len(there):
@@ -251,10 +250,7 @@ class Dialogue:
     def undo(self) -> None:
         """Forget the last turn.
 
-        Raises
-        ------
-        ValueError
-            If there is none.
+        Raises ValueError if there is none.
         """
         if not self.history:
             raise ValueError("there is nothing to undo")
@@ -264,15 +260,9 @@ class Dialogue:
 
     def table(self) -> str:
         """The history as plain text: a row for each turn, with the objectives and their degrees."""
-        titles = ["turn", "asked", *(goal.name for goal in self.goals), *["degree"] * len(self.goals)]
-        units = ["", "", *(f"{goal.sense[:3]} [{goal.unit or '-'}]" for goal in self.goals), *(goal.name for goal in self.goals)]
-        rows = []
-        for k, turn in enumerate(self.history):
-            chosen = turn.choice
-            values = ["-"] * len(self.goals) if chosen is None else [f"{value:.6g}" for value in chosen.objectives.values()]
-            degrees = ["-"] * len(self.goals) if chosen is None else [degree_text(chosen.degrees[goal.name]) for goal in self.goals]
-            rows.append([str(k + 1), shorten(turn.asked, 60, placeholder=" …"), *values, *degrees])
-        return text_table([titles, units], rows, [False, True, *[False] * (2 * len(self.goals))])
+        turns = self.history
+        heads = {"turn": [str(k + 1) for k in range(len(turns))], "asked": [shorten(turn.asked, 60, placeholder=" …") for turn in turns]}
+        return choices_table(self.goals, heads, [turn.choice for turn in turns])
 
     def plot(self, by: Preference | None = None, figure: Any = None) -> Sequence[Axes]:
         """Axes with the degrees of all choices as bars, turn by turn, and one for each objective with its values.
@@ -346,8 +336,8 @@ class Dialogue:
             return ChoiceRecord(
                 point=place[id(choice.point._points), choice.point.index],
                 objectives=choice.objectives,
-                degrees={name: finite(value) for name, value in choice.degrees.items()},
-                values=[finite(value) for value in choice.values],
+                degrees=dict(choice.degrees),
+                values=list(choice.values),
                 verified=choice.point.verified,
                 message=choice.message,
             )

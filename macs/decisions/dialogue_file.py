@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from ..fronts import files
 from ..fronts.points import Points
@@ -67,7 +66,8 @@ class DialogueRecord(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 def write(record: DialogueRecord, path: str | PathLike[str]) -> None:
     """Write a file, whole or not at all."""
-    write_whole(path, (json.dumps(msgspec.to_builtins(record), ensure_ascii=False, allow_nan=False, indent=1) + "\n").encode())
+    # Infinity, and what is no number, is null.
+    write_whole(path, msgspec.json.format(msgspec.json.encode(record), indent=1) + b"\n")
 
 
 def packed(points: Points) -> str:
@@ -101,11 +101,6 @@ def is_dialogue(path: str | PathLike[str]) -> bool:
     """Whether a file begins as one of a dialogue does, and not as that of a front."""
     with Path(path).open("rb") as file:
         return file.read(1) == b"{"
-
-
-def finite(value: float) -> float | None:
-    """A number for JSON, which has no infinity, and nothing that is no number."""
-    return float(value) if np.isfinite(value) else None
 
 
 def _read(content: bytes) -> tuple[DialogueRecord, Points]:

@@ -11,11 +11,12 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..fronts.pictures.style import COLORS, GREY, STYLE, axis_label, better, new_figure, title_and_legend
+from ..fronts.pictures.style import COLORS, GREY, axis_label, better, new_figure, styled, title_and_legend
 from ..fronts.points import Points
 from ..io.text import label
-from ..preferences import Preference, Ranges
 from ..preferences.pictures import draw_degrees
+from ..preferences.preference import Preference
+from ..preferences.ranges import Ranges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,14 +24,12 @@ if TYPE_CHECKING:
 
 def draw_rates(front: Points, rates: np.ndarray, figure: Any = None) -> Sequence[Any]:
     """See `plot_rates`; `rates` (n, m, m)."""
-    import matplotlib
-
     m = len(front.goals)
     if m < 2:
         raise ValueError("a front of one objective has no trade-offs to draw")
     if not len(front) or np.isnan(rates).all(axis=0)[0, 1]:
         raise ValueError("no point of the front has weights: those of gradient solves and of searches that use gradients have")
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with styled():
         return _two(front, rates, figure) if m == 2 else _more(front, rates, figure)
 
 
@@ -105,10 +104,8 @@ def _dashes(ax: Any, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> None:
 def draw_trade_offs(goals: Sequence[Objective], ranges: np.ndarray, tables: Mapping[str, np.ndarray], figure: Any = None) -> Sequence[Any]:
     """Axes with what all objectives change by when one gets better by a tenth of its range, or by one unit where it has none: a row for
     each that gets better, darker where the change is more of a range; see `TradeOffs.plot`. goals, ranges (m,)."""
-    import matplotlib
-
     steps = np.array([_round(0.1 * size) if size > 0 else 1.0 for size in ranges])
-    with matplotlib.rc_context(STYLE | {"axes.grid": False}):  # type: ignore[arg-type]
+    with styled():
         m = len(goals)
         figure = _sized(figure, 1.2 + len(tables) * (1.05 * m + 0.2) + 0.8, 0.55 * m + 1.5)
         axes = np.atleast_1d(figure.subplots(1, len(tables), sharey=True))
@@ -123,6 +120,7 @@ def draw_trade_offs(goals: Sequence[Objective], ranges: np.ndarray, tables: Mapp
             ax.set_xticks(range(m), [label(goal.name, goal.unit).replace(" ", "\n") for goal in goals])
             ax.set_title(title, loc="left", color=GREY)
             ax.tick_params(length=0)
+            ax.grid(False)
             for side in ax.spines.values():
                 side.set_visible(False)
         figure.supxlabel(
@@ -165,8 +163,6 @@ def draw_history(
     figure: Any = None,
 ) -> Sequence[Axes]:
     """Axes with the degrees of choices, a group of bars for each, and one for each objective with its values."""
-    import matplotlib
-
     if not choices:
         raise ValueError("nothing was chosen yet: there is no history to draw")
     J = np.array([[*one.objectives.values()] for one in choices])
@@ -178,7 +174,7 @@ def draw_history(
     degrees = np.array([[one.degrees[goal.name] for goal in goals] for one in choices]) if by is None else by.degrees(goals, ranges, J)
     heights = kinds[0].DEGREE if len({one.DEGREE for one in kinds}) == 1 else "degree (1: all that was asked for)"
     marks = kinds[0].MARKS if len({one.MARKS for one in kinds}) == 1 else ()
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with styled():
         left = max(3.6, 0.9 + len(choices) * max(1.25, 0.36 * len(goals)))
         figure = new_figure(1.0, 1.0) if figure is None else figure
         figure.set_size_inches(left + 3.4, max(3.6, 1.3 * len(goals) + 0.8))

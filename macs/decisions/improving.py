@@ -11,9 +11,11 @@ from problems.checks import number
 from problems.compiled import Objective
 
 from ..fronts.point import Point
-from ..preferences import Larger, Nimbus, PhysicalProgramming, Preference, Ranges, ReferencePoint, Smaller
-from ..preferences.preference_functions import BOUNDARIES, ObjectiveClass
-from ..preferences.ranges import named_numbers, places, shown
+from ..preferences.achievement import Nimbus, ReferencePoint
+from ..preferences.physical import PhysicalProgramming
+from ..preferences.preference import Preference
+from ..preferences.preference_functions import BOUNDARIES, Larger, ObjectiveClass, Smaller
+from ..preferences.ranges import Ranges, named_numbers, places, shown
 
 
 def improved(
@@ -57,7 +59,7 @@ def improved(
     others = [one.name for one in goals if one.name not in (name, *given)]
     classed = {"keep": others} if given else {"free": others}
     wanted = {"improve": [name]} if to is None else {"to": {name: asked}, "enough": True}
-    return Nimbus(now, until=given or None, **wanted, **classed)  # type: ignore[arg-type]
+    return Nimbus(now, until=given, **wanted, **classed)  # type: ignore[arg-type]
 
 
 def neutral(ranges: Ranges) -> ReferencePoint:

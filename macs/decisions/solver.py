@@ -6,7 +6,7 @@ import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
@@ -28,10 +28,9 @@ from ..gradient_tools import AUTO, Terms, payoff
 from ..gradients.front_polish import KEPT_INSIDE
 from ..gradients.scalarised import GradientSolves
 from ..io.console import working
-from ..preferences import Preference, Ranges, Stage
-from ..preferences.preference import BEYOND, CONFIRMED, keeps_limits, standing, within_limits
-from ..preferences.ranges import shown
-from ..preferences.stage import LIMIT_TOL, conflict_message, exceeded, excess_stage, ordering, with_all_limits
+from ..preferences.preference import BEYOND, CONFIRMED, Preference, keeps_limits, standing, within_limits
+from ..preferences.ranges import Ranges, shown
+from ..preferences.stage import LIMIT_TOL, Stage, conflict_message, exceeded, excess_stage, ordering
 from ..refinement.mesh_search import coarse_meshes
 from ..solvers.start import beginning
 from .choice import Choice, Step
@@ -95,17 +94,9 @@ class DecisionSolver:
             return task()
 
     def _payoff_table(self) -> Points:
-        terms = self._terms
-        ends = payoff(
-            self._statement,
-            self._transcription,
-            starts=terms.starts,
-            seed=self._seed,
-            tolerance=terms.tolerance,
-            verify=terms.verify,
-            max_iterations=terms.max_iterations,
-            progress=terms.progress,
-        )
+        # Time is limited and Ctrl-C heard around it.
+        terms = replace(self._terms, seed=self._seed, time_limit=None)
+        ends = payoff(self._statement, self._transcription, **asdict(terms))
         if self._resolves and self._transcription is not None:
             ends = ends.mended(progress=terms.progress)
         self._costs = dict(ends.stats)
@@ -136,29 +127,28 @@ class DecisionSolver:
         """
         self._preference, self._about = preference, about or {}
         stages = stages or preference.stages(self.problem.goals, self.ranges)
-        solved = with_all_limits(stages, len(self.problem.goals))
-        limits = solved[0]
+        limits = stages[0]
         candidates = [*also, *self._ranked()]
         try:
-            new, message = self._solve(solved, candidates)
+            new, message = self._solve(stages, candidates)
         except Stopped as reason:
             new, message = None, f"{reason}: no stage was solved to its end"
             if not candidates:
                 self._end(str(reason))
         points = [*([] if new is None else [new]), *candidates]
         objectives = np.array([[*point.objectives.values()] for point in points])
-        standings = np.concatenate([standing([limits], point.alone(), self._terms.verify) for point in points])
-        order = ordering(stages, objectives, standings, same=SAME_VALUE)
-        first = int(order.order[0])
+        standings = np.concatenate([standing(limits, point.alone(), self._terms.verify) for point in points])
+        order, values = ordering(stages, objectives, standings, same=SAME_VALUE)
+        first = int(order[0])
         said = [message] if message else []
         if new is not None and points[first] is not new and not message:
-            better = ordering(stages, objectives, np.zeros(len(points)), same=SAME_VALUE).order[0] == 0
+            better = ordering(stages, objectives, np.zeros(len(points)), same=SAME_VALUE)[0][0] == 0
             said.append(f"a better point was found, but not confirmed: {new.note}" if better else NOTHING_BETTER)
-        others = [i for i in order.order if standings[i] in (CONFIRMED, BEYOND)]
+        others = [i for i in order if standings[i] in (CONFIRMED, BEYOND)]
         said += self._messages(limits, points[first], points[first] is new, message, objectives[others[:1]])
-        values = np.nan_to_num(order.values[first], posinf=np.inf).tolist()
+        attained = np.nan_to_num(values[first], posinf=np.inf).tolist()
         degrees, history = self._degrees(objectives[[first]]), tuple(self.history)
-        return Choice(points[first], tuple(values), degrees, history, preference, self.ranges, "; ".join(said), self._reason())
+        return Choice(points[first], tuple(attained), degrees, history, preference, self.ranges, "; ".join(said), self._reason())
 
     def _messages(self, limits: Stage, chosen: Point, is_new: bool, message: str, confirmed: np.ndarray) -> list[str]:
         """What is to be known of the chosen point beside the message of its solves; `confirmed` are the objectives (k, m) of the best point
@@ -209,7 +199,7 @@ class DecisionSolver:
         limits = stages[0]
         begun: StageSolution | None = None
         nearest: Point | None = None
-        if limits.limit_names and not any(within_limits(limits, point) for point in candidates):
+        if limits.limited and not any(within_limits(limits, point) for point in candidates):
             begun = self._least_excess(limits, candidates)
             if begun.status == CONVERGED and limits.excess((begun.F * self.problem.signs)[None])[0] > LIMIT_TOL:
                 nearest = self._confirmed([excess_stage(limits)], begun)
@@ -234,7 +224,7 @@ class DecisionSolver:
         rivals = [replace(failed, status=CONVERGED, note=f"{failed.note}; {NO_OPTIMUM}")] if feasible else []
         rivals += [begun] if begun is not None and begun.status == CONVERGED else []
         J = np.array([one.F * self.problem.signs for one in rivals])
-        return rivals[ordering(stages, J, np.zeros(len(J)), same=SAME_VALUE).order[0]] if rivals else failed
+        return rivals[ordering(stages, J, np.zeros(len(J)), same=SAME_VALUE)[0][0]] if rivals else failed
 
     def _solve_stages(self, stages: Sequence[Stage], first: Callable[[Stage], StageSolution]) -> tuple[StageSolution, str]:
         """What solves of all stages lead to, each after the first on the mesh of that, and what is to be said of it."""

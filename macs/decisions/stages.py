@@ -10,7 +10,7 @@ import numpy as np
 from problems.compiled import CompiledProblem
 from problems.valued import ObjectiveBox, Valued, valued
 from transcription import from_dict
-from transcription.base import NLP
+from transcription.base import NLP, Transcription
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import Solved
@@ -23,8 +23,7 @@ from ..fronts.provenance import costs
 from ..fronts.verified import unmarked
 from ..gradients.multistart import MultistartSolver
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised
-from ..preferences import Stage
-from ..preferences.stage import no_limits
+from ..preferences.stage import Stage, no_limits
 from ..refinement.mending import resolve_unverified
 from ..refinement.mesh_loop import MeshLoop, Programs
 from ..refinement.mesh_search import SEARCH, MeshSearch
@@ -141,31 +140,36 @@ class StageSolver:
             # What stages before attained on this mesh is not what they attain on others.
             return solution
         found = self._resolved(before.nlp, before.z, solution.note, verify)
-        z, method = found[0].decision, from_dict(found[0].transcription or {})
-        if method == before.nlp.transcription and np.array_equal(z, before.z):
+        if found is None:
             return solution
+        method, z, note = found
         nlp, own = method.nlp(before.derived.problem), method.nlp(self.problem)
-        return self._solution(before.stage, before.first, before.derived, nlp, own, z, CONVERGED, unmarked(found)[0].note)
+        return self._solution(before.stage, before.first, before.derived, nlp, own, z, CONVERGED, note)
 
     def nearest(self, solution: StageSolution, verify: float, known: Points) -> StageSolution:
         """A solution, solved again in the objectives themselves, from where it is on, where a simulation does not confirm it; itself where
         that leads nowhere. Objectives are judged by the ranges of known points."""
         found = self._resolved(solution.nlp, solution.z, solution.note, verify, _confirmed_ends(known).replace(problem=self.problem))
-        z, method = found[0].decision, from_dict(found[0].transcription or {})
-        if method == solution.nlp.transcription and np.array_equal(z, solution.z):
+        if found is None:
             return solution
-        note = "; ".join(filter(None, [ONLY_NEAR, unmarked(found)[0].note]))
-        return StageSolution(method.nlp(self.problem), z, found.F[0], CONVERGED, note)
+        method, z, note = found
+        nlp = method.nlp(self.problem)
+        return StageSolution(nlp, z, nlp.evaluate(z[None])[0][0], CONVERGED, "; ".join(filter(None, [ONLY_NEAR, note])))
 
-    def _resolved(self, nlp: NLP, z: np.ndarray, note: str, verify: float, among: Points | None = None) -> Points:
-        """A converged vector as a point, solved again as those of other gradient tools are if a simulation does not confirm it, beside
-        confirmed points of a front; what that costs is counted."""
+    def _resolved(
+        self, nlp: NLP, z: np.ndarray, note: str, verify: float, among: Points | None = None
+    ) -> tuple[Transcription, np.ndarray, str] | None:
+        """A converged vector, solved again as points of other gradient tools are if a simulation does not confirm it, beside confirmed
+        points of a front: its transcription, the vector and its note; None where that leads nowhere. What it costs is counted."""
         about = costs(Counts(), wall_time=0.0, seed=None, tolerance=self.solves.tolerance, reproducible=True)
         point = from_vectors(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
         found = resolve_unverified(point if among is None else unmarked(Points.concatenate([point, among])), verify)
         spent = {key: found.stats[key] for key in ("gradient_solves", "inner_iterations", "work", "gradient_work")}
         self.solves.counts = self.solves.counts.joined(Counts(**spent, clocked=int(not found.stats["reproducible"])))
-        return found[[0]]
+        first, method = found[0], from_dict(found[0].transcription or {})
+        if method == nlp.transcription and np.array_equal(first.decision, z):
+            return None
+        return method, first.decision, unmarked(found)[0].note
 
     def _derived(self, stage: Stage, kept: Sequence[StageBound], known: StartVectors) -> Valued:
         """The problem with the value of the stage as its objective."""

@@ -26,6 +26,7 @@ from ..fronts.builders import CERTIFIED
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..io.text import text_table
+from ..preferences.ranges import sense_and_unit
 from ..refinement.mesh_loop import Programs
 
 if TYPE_CHECKING:
@@ -59,10 +60,8 @@ def trade_offs(point: Point, *, problem: Problem | CompiledProblem | None = None
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> front = macs.sweep(problems.load("goddard"), points=3, starts=1)
     >>> from macs.decisions import trade_offs
     >>> trade_offs(front[1]).rate("horizontal speed", "flight time") > 0  # km/s for a second more
     True
@@ -91,10 +90,8 @@ class TradeOffs:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> front = macs.sweep(problems.load("goddard"), points=3, starts=1)
     >>> from macs.decisions import trade_offs
     >>> found = trade_offs(front[1])
     >>> found.rate("flight time", "horizontal speed") > 0
@@ -145,23 +142,13 @@ class TradeOffs:
         It is a derivative, of the local optima that this point is one of. How far it holds is another question: fronts of flights with
         many active limits bend sharply, and other optima nearby, which may be better, have rates of their own.
 
-        Raises
-        ------
-        ValueError
-            If there is no such objective, and as for `weights`.
-        """
+        Raises ValueError if there is no such objective, and as `weights` does."""
         return float(self.rates[self._number(i), self._number(j)])
 
     def bounds(self, i: str | int, j: str | int) -> tuple[float, float]:
         """The least and the largest dJ_i/dJ_j of all weights with which the point is as optimal as points are, to `SOLVED_TO`, or as it is
         with its own. At a corner of the front, these are the rates of its sides; where it bends sharply, they say how well the rate is
-        known.
-
-        Raises
-        ------
-        ValueError
-            As for `rate` and `matrix`.
-        """
+        known. Raises ValueError as `rate` and `matrix` do."""
         one, other = self._number(i), self._number(j)
         if one == other:
             return 1.0, 1.0
@@ -181,10 +168,7 @@ class TradeOffs:
         For minimised objectives a negative entry says that k gets worse while i gets better, a positive one that both get better; where one
         of the two is maximised the sign is the other one. A row of an objective that can get no better within what is active is no number.
 
-        Raises
-        ------
-        ValueError
-            If the problem is not at hand, or the derivatives are no numbers.
+        Raises ValueError if the problem is not at hand, or the derivatives are no numbers.
         """
         falls = self._falls / np.where(self._fixed, np.nan, np.diag(self._falls))[:, None]
         np.fill_diagonal(falls, 1.0)
@@ -193,13 +177,7 @@ class TradeOffs:
     @property
     def directions(self) -> np.ndarray:
         """The directions (m, n) of the matrix: variations of the point's decision vector in the user's units, to first order, by which
-        objective i gets better by one unit. Not numbers where the row of the matrix is none.
-
-        Raises
-        ------
-        ValueError
-            As for `matrix`.
-        """
+        objective i gets better by one unit. Not numbers where the row of the matrix is none. Raises ValueError as `matrix` does."""
         found = self._projection
         size = np.where(self._fixed, np.nan, np.diag(self._falls))
         return np.array([found.descent(one) for one in np.eye(len(size))]) / size[:, None]
@@ -207,12 +185,7 @@ class TradeOffs:
     @property
     def left(self) -> float:
         """How much the weighted sum of the projected gradients keeps of the longest one before the projection: 0 at a Pareto-optimal point.
-
-        Raises
-        ------
-        ValueError
-            As for `matrix`.
-        """
+        Raises ValueError as `matrix` does."""
         found = self._projection
         if self.point.weights is None:
             return found.left(found.weights)
@@ -241,32 +214,32 @@ class TradeOffs:
         """What all objectives change by when one gets better by one unit, as plain text: along the front with the others held; of more than
         two, also where it gets better fastest; and the `messages`."""
         lines = [f"Trade-offs at point {self.point.index}: {self.point.title}", ""]
-        titles = ["one better in", *(goal.name for goal in self.goals)]
-        under = ["", *(f"{goal.sense[:3]} [{goal.unit or '-'}]" for goal in self.goals)]
-        flush = [True, *(False for _ in self.goals)]
         try:
-            names, weights = list(self.weights), list(self.weights.values())
-            cells = [["weight", *(f"{value:.4g}" for value in weights)]]
-            cells += [[name, *row] for name, row in zip(names, _cells(self.rates.T, self._signs), strict=True)]
-            lines += ["Along the front, one other objective giving way and the rest held:", text_table([titles, under], cells, flush), ""]
+            lines += [self.rates_table(), ""]
         except ValueError as reason:
             lines += [f"No rates: {reason}.", ""]
         # Where there is none, the messages have the reason.
         with suppress(ValueError):
-            rows = zip(self.goals, _cells(self.matrix, self._signs), strict=True)
-            table = text_table([titles, under], [[goal.name, *row] for goal, row in rows], flush)
+            table = self._changes(self.matrix)
             lines += ["Where it gets better fastest, all others giving way:", table, ""] if len(self.goals) > 2 else []
         return "\n".join([*lines, *(f"{message[0].upper()}{message[1:]}." for message in self.messages)]).rstrip()
+
+    def rates_table(self) -> str:
+        """What all objectives change by along the front when one gets better by one unit, and their weights, as plain text.
+        Raises ValueError as `weights` does."""
+        weights = ["weight", *(f"{value:.4g}" for value in self.weights.values())]
+        return f"Along the front, one other objective giving way and the rest held:\n{self._changes(self.rates.T, weights)}"
+
+    def _changes(self, by_one: np.ndarray, *above: list[str]) -> str:
+        """A table of what all objectives change by (m, m), from derivatives by the objective of the row, when that gets better by one."""
+        titles = ["one better in", *(goal.name for goal in self.goals)]
+        cells = [[goal.name, *(_signed(-goal.sign * value) for value in row)] for goal, row in zip(self.goals, by_one, strict=True)]
+        return text_table([titles, ["", *map(sense_and_unit, self.goals)]], [*above, *cells], [True, *[False] * len(self.goals)])
 
     def plot(self, figure: object = None) -> Sequence[Axes]:
         """Axes with what all objectives change by when one gets better by a tenth of its range: along the front with the others held; of
         more than two, with the problem at hand, also where it gets better fastest. Darker is more of a range.
-
-        Raises
-        ------
-        ValueError
-            As for `weights`.
-        """
+        Raises ValueError as `weights` does."""
         from .figures import draw_trade_offs
 
         tables = {"along the front, the rest held": self.rates.T}
@@ -386,10 +359,8 @@ def front_rates(front: Points) -> np.ndarray:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> front = macs.sweep(problems.load("goddard"), points=3, starts=1)
     >>> from macs.decisions import front_rates
     >>> front_rates(front).shape
     (3, 2, 2)
@@ -418,10 +389,8 @@ def plot_rates(front: Points, figure: object = None) -> Sequence[Axes]:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> front = macs.sweep(problems.load("goddard"), points=3, starts=1)
     >>> from macs.decisions import plot_rates
     >>> axes = plot_rates(front)
     >>> len(axes) > 0
@@ -436,11 +405,6 @@ def plot_rates(front: Points, figure: object = None) -> Sequence[Axes]:
 def _programs(problem: CompiledProblem) -> Programs:
     """The NLPs of the latest points: those on meshes of their own have one each."""
     return Programs(problem)
-
-
-def _cells(by_one: np.ndarray, signs: np.ndarray) -> list[list[str]]:
-    """What all objectives change by (m, m) as text, from derivatives by the objective of the row, when that gets better by one unit."""
-    return [[_signed(-sign * value) for value in row] for row, sign in zip(by_one, signs, strict=True)]
 
 
 def _signed(value: float) -> str:

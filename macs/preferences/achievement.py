@@ -4,7 +4,7 @@ and NIMBUS, which says which objectives may change, and how, from a current poin
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +14,7 @@ from problems.compiled import Objective
 
 from ..fronts.point import Point
 from .preference import Preference, needed
-from .ranges import Ranges, named_numbers, named_weights, names_of, places, shown
+from .ranges import Ranges, limit_name, named_numbers, named_weights, names_of, places, shown
 from .stage import LIMIT_TOL, Operand, Stage
 
 AUGMENTATION = 1e-4
@@ -47,10 +47,6 @@ class WeightedSum(Preference):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", named_weights(self.weights))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.weights)
 
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
         found, spans = places(self.weights, goals), needed(ranges, self)
@@ -102,10 +98,6 @@ class ReferencePoint(Preference):
         if self.reservation is not None:
             object.__setattr__(self, "reservation", named_numbers(self.reservation, "the reservation"))
         check_interval("augmentation", self.augmentation, "[0, 1]")
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys([*self.aspiration, *(self.reservation or {})]))
 
     def _lines(self, goals: Sequence[Objective], ranges: Ranges | None) -> list[tuple[float, float]]:
         """The slope of a_i and its aspiration, for each goal."""
@@ -182,9 +174,9 @@ class Nimbus(Preference):
 
     current: Mapping[str, float]
     improve: Sequence[str] = ()
-    to: Mapping[str, float] | None = None
+    to: Mapping[str, float] = field(default_factory=dict)
     keep: Sequence[str] = ()
-    until: Mapping[str, float] | None = None
+    until: Mapping[str, float] = field(default_factory=dict)
     free: Sequence[str] = ()
     augmentation: float = AUGMENTATION
     enough: bool = False
@@ -208,22 +200,14 @@ class Nimbus(Preference):
         for name in self.names:
             if self.names.count(name) > 1:
                 raise ValueError(f"'{name}' is in two classes of Nimbus")
-        if not self.improve and not self._to:
+        if not self.improve and not self.to:
             raise ValueError("Nimbus needs an objective that is to become better, in `improve` or `to`")
-        if not self._until and not self.free:
+        if not self.until and not self.free:
             raise ValueError("Nimbus needs an objective that may become worse, in `until` or `free`")
 
     @property
     def names(self) -> tuple[str, ...]:
-        return (*self.improve, *self._to, *self.keep, *self._until, *self.free)
-
-    @property
-    def _to(self) -> Mapping[str, float]:
-        return self.to or {}
-
-    @property
-    def _until(self) -> Mapping[str, float]:
-        return self.until or {}
+        return (*self.improve, *self.to, *self.keep, *self.until, *self.free)
 
     def check(self, goals: Sequence[Objective]) -> None:
         """Raise ValueError if an objective is in no class, one that is none is in a class, or the values of a class make no sense."""
@@ -235,63 +219,59 @@ class Nimbus(Preference):
             if name not in self.names:
                 raise ValueError(f"'{name}' is in no class of Nimbus: improve, to, keep, until or free")
             now = shown(self.current[name], goal)
-            if name in self._to and goal.sign * (self._to[name] - self.current[name]) >= 0:
-                raise ValueError(f"'{name}' is to improve to {shown(self._to[name], goal)}, which is not better than {now}")
-            if name in self._until and goal.sign * (self._until[name] - self.current[name]) < 0:
-                raise ValueError(f"'{name}' may become worse until {shown(self._until[name], goal)}, which is better than {now}")
+            if name in self.to and goal.sign * (self.to[name] - self.current[name]) >= 0:
+                raise ValueError(f"'{name}' is to improve to {shown(self.to[name], goal)}, which is not better than {now}")
+            if name in self.until and goal.sign * (self.until[name] - self.current[name]) < 0:
+                raise ValueError(f"'{name}' may become worse until {shown(self.until[name], goal)}, which is better than {now}")
 
     def _checked(self, goals: Sequence[Objective], ranges: Ranges | None) -> Ranges:
         """The ranges, if each objective is in a class whose values make sense, and what is asked for lies in them."""
         spans = needed(ranges, self)
         self.check(goals)
         for goal in goals:
-            if goal.name in self._to:
-                spans.check(self._to[goal.name], goal, "the value in `to`")
+            if goal.name in self.to:
+                spans.check(self.to[goal.name], goal, "the value in `to`")
         return spans
 
-    def _limits(self, goals: Sequence[Objective]) -> dict[int, float]:
-        """The value that each limited objective may not exceed, by place."""
-        values = {**{name: self.current[name] for name in (*self.improve, *self._to, *self.keep)}, **self._until}
-        found = places(values, goals)
-        return {found[name]: value for name, value in values.items()}
+    @property
+    def _limits(self) -> dict[str, float]:
+        """The value that each limited objective may not exceed."""
+        return {**{name: self.current[name] for name in (*self.improve, *self.to, *self.keep)}, **self.until}
 
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
         spans = self._checked(goals, ranges)
-        slopes = [goal.sign / span for goal, span in zip(goals, spans.spans(goals).tolist(), strict=True)]
-        limited, asked = self._limits(goals), {**{name: spans.best[name] for name in self.improve}, **self._to}
-        found = places(self.current, goals)
+        found, widths = places(self.current, goals), spans.spans(goals).tolist()
+        limited, asked = self._limits, {**{name: spans.best[name] for name in self.improve}, **self.to}
+        others = {name: now for name, now in self.current.items() if name not in asked}
+
+        def excesses(J: Sequence[Operand], values: Mapping[str, float]) -> list[Operand]:
+            """Over these values, in widths of ranges."""
+            every = ((found[name], value) for name, value in values.items())
+            return [goals[place].sign / widths[place] * (J[place] - value) for place, value in every]
 
         def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
             return peaks[0] + self.augmentation * sum(spans.normalised(goals, J))
 
-        def excesses(J: Sequence[Operand], values: Mapping[str, float]) -> list[Operand]:
-            return [slopes[found[name]] * (J[found[name]] - target) for name, target in values.items()]
-
-        def limits(J: Sequence[Operand]) -> list[Operand]:
-            return [slopes[place] * (J[place] - limit) for place, limit in limited.items()]
-
-        words = [
-            f"{goals[place].name} {'at most' if goals[place].sign > 0 else 'at least'} {shown(limit, goals[place])}"
-            for place, limit in limited.items()
-        ]
+        limits = (
+            (lambda J: excesses(J, limited)),
+            tuple(limit_name(goals[found[name]], goals[found[name]].sign, limit) for name, limit in limited.items()),
+        )
         if not self.enough:
-            return (Stage("achievement", value, lambda J: [excesses(J, asked)], limits, tuple(words)),)
-        others = {name: now for name, now in self.current.items() if name not in asked}
+            return (Stage("achievement", value, lambda J: [excesses(J, asked)], *limits),)
         return (
-            Stage("missing", lambda J, peaks: peaks[0], lambda J: [[0.0, *excesses(J, asked)]], limits, tuple(words)),
+            Stage("missing", lambda J, peaks: peaks[0], lambda J: [[0.0, *excesses(J, asked)]], *limits),
             Stage("loss of others", value, lambda J: [excesses(J, others)], after_zero=True),
         )
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
         spans, J = self._checked(goals, ranges), np.asarray(objectives, dtype=float)
-        result, widths = np.full(J.shape, np.nan), spans.spans(goals)
-        for place, limit in self._limits(goals).items():
-            goal = goals[place]
-            asked = self._to.get(goal.name, spans.best[goal.name])
-            way = goal.sign * (self.current[goal.name] - asked)
-            if goal.name in self.improve or goal.name in self._to:
-                done = goal.sign * (self.current[goal.name] - J[:, place])
+        result = np.full(J.shape, np.nan)
+        for place, (goal, width) in enumerate(zip(goals, spans.spans(goals), strict=True)):
+            name = goal.name
+            if name in self.improve or name in self.to:
+                way = goal.sign * (self.current[name] - self.to.get(name, spans.best[name]))
+                done = goal.sign * (self.current[name] - J[:, place])
                 result[:, place] = np.clip(done / way, 0.0, 1.0) if way > 0 else 1.0
-            else:
-                result[:, place] = np.where(goal.sign * (J[:, place] - limit) <= LIMIT_TOL * widths[place], 1.0, 0.0)
+            elif name in self._limits:
+                result[:, place] = np.where(goal.sign * (J[:, place] - self._limits[name]) <= LIMIT_TOL * width, 1.0, 0.0)
         return result

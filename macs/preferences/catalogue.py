@@ -83,7 +83,7 @@ def from_dict(data: Any) -> Preference:
     known = settings_of(kind)
     _check_keys(given, [one.name for one in known], method)
     for one in known:
-        if one.name not in given and one.default is MISSING:
+        if one.name not in given and one.default is MISSING and one.default_factory is MISSING:
             raise ValueError(f"{method}: '{one.name}' is missing")
     try:
         return kind(**{name: value if isinstance(value, bool) else _made(value, 1) for name, value in given.items()})

@@ -3,9 +3,10 @@ and Rao 1987), and memberships with an order of priority that is relaxed (Hu and
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import partial
+from itertools import chain, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,7 +15,7 @@ from problems.checks import check_choice, check_interval, number, positive
 from problems.compiled import Objective
 
 from .preference import Preference, needed
-from .ranges import Ranges, check_among, levels, named, named_weights, places, shown
+from .ranges import Ranges, check_among, levels, limit_name, named, named_weights, places, shown
 from .stage import Operand, Stage, greatest
 
 
@@ -133,20 +134,15 @@ def memberships(aims_of: Mapping[str, Aim], objectives: np.ndarray, m: int) -> n
     return result
 
 
-def tolerance_limits(
-    aims_of: Mapping[str, Aim], goals: Sequence[Objective]
-) -> tuple[Callable[[Sequence[Operand]], list[Operand]], tuple[str, ...]]:
-    """Hard limits where memberships become zero, and what each says."""
-    names = []
-    for aim in aims_of.values():
-        goal = goals[aim.place]
-        for slope, target in aim.sides:
-            names.append(f"{goal.name} {'at most' if slope > 0 else 'at least'} {shown(target + 1.0 / slope, goal)}")
+def tolerance_limits(aims_of: Mapping[str, Aim], J: Sequence[Operand]) -> list[Operand]:
+    """Hard limits where memberships become zero."""
+    return [excess - 1.0 for aim in aims_of.values() for excess in aim.excesses(J)]
 
-    def limits(J: Sequence[Operand]) -> list[Operand]:
-        return [excess - 1.0 for aim in aims_of.values() for excess in aim.excesses(J)]
 
-    return limits, tuple(names)
+def tolerance_names(aims_of: Mapping[str, Aim], goals: Sequence[Objective]) -> tuple[str, ...]:
+    """What each of these limits says."""
+    every = ((goals[aim.place], slope, target) for aim in aims_of.values() for slope, target in aim.sides)
+    return tuple(limit_name(goal, slope, target + 1.0 / slope) for goal, slope, target in every)
 
 
 def sum_of_all(goals: Sequence[Objective], ranges: Ranges) -> Stage:
@@ -205,32 +201,22 @@ class GoalProgramming(Preference):
                     raise ValueError(f"'{name}' has a target but no priority")
             object.__setattr__(self, "priorities", given)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.targets)
-
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
         spans = needed(ranges, self)
-        found = aims(self.targets, goals, spans)
+        found, given = aims(self.targets, goals, spans), self.weights or {}
         ordered = levels(self.priorities) if self.priorities is not None else (tuple(self.targets),)
+
+        def stage(title: str, level: Sequence[str]) -> Stage:
+            """The weighted sum of the deviations of one level."""
+            weights = [given.get(name, 1.0) for name in level]
+            return Stage(
+                title,
+                lambda J, peaks: sum(weight * peak for weight, peak in zip(weights, peaks, strict=True)),
+                lambda J: [[0.0, *found[name].excesses(J)] for name in level],
+            )
+
         titles = ["deviations"] if len(ordered) == 1 else [f"priority {k + 1}" for k in range(len(ordered))]
-        stages = [
-            self._stage(title, [(self._weight(name), found[name]) for name in level]) for title, level in zip(titles, ordered, strict=True)
-        ]
-        return (*stages, sum_of_all(goals, spans))
-
-    def _weight(self, name: str) -> float:
-        return 1.0 if self.weights is None else self.weights.get(name, 1.0)
-
-    @staticmethod
-    def _stage(title: str, weighted: Sequence[tuple[float, Aim]]) -> Stage:
-        def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
-            return sum(weight * peak for (weight, _), peak in zip(weighted, peaks, strict=True))
-
-        def groups(J: Sequence[Operand]) -> list[list[Operand]]:
-            return [[0.0, *aim.excesses(J)] for _, aim in weighted]
-
-        return Stage(title, value, groups)
+        return (*map(stage, titles, ordered), sum_of_all(goals, spans))
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
         return memberships(aims(self.targets, goals, needed(ranges, self)), objectives, len(goals))
@@ -282,29 +268,19 @@ class FuzzyGoal(Preference):
             widths[name] = positive(width, f"the tolerance of '{name}'")
         object.__setattr__(self, "tolerances", widths)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.targets)
-
     def _aims(self, goals: Sequence[Objective], ranges: Ranges | None) -> dict[str, Aim]:
         return aims(self.targets, goals, needed(ranges, self), self.tolerances, to_worst=True)
 
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
-        found = self._aims(goals, ranges)
-        limits, limit_names = tolerance_limits(found, goals)
+        found, least = self._aims(goals, ranges), self.aggregate == "min"
 
         def groups(J: Sequence[Operand]) -> list[list[Operand]]:
             each = [aim.excesses(J) for aim in found.values()]
-            return [[0.0, *(one for excesses in each for one in excesses)]] if self.aggregate == "min" else [[0.0, *one] for one in each]
+            return [[0.0, *chain(*each)]] if least else [[0.0, *one] for one in each]
 
-        stage = Stage(
-            "largest 1 - membership" if self.aggregate == "min" else "sum of 1 - membership",
-            lambda J, peaks: sum(peaks),
-            groups,
-            limits,
-            limit_names,
-        )
-        return stage, sum_of_all(goals, needed(ranges, self))
+        name = "largest 1 - membership" if least else "sum of 1 - membership"
+        limits = partial(tolerance_limits, found), tolerance_names(found, goals)
+        return Stage(name, lambda J, peaks: sum(peaks), groups, *limits), sum_of_all(goals, needed(ranges, self))
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
         return memberships(self._aims(goals, ranges), objectives, len(goals))
@@ -384,7 +360,6 @@ class FuzzySatisfactory(Preference):
 
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
         found = self._aims(goals, ranges)
-        tolerances, limit_names = tolerance_limits(found, goals)
 
         def value(J: Sequence[Operand], peaks: Sequence[Operand]) -> Operand:
             return sum(peaks[1:]) / len(found) + self.regulating * peaks[0]
@@ -395,10 +370,10 @@ class FuzzySatisfactory(Preference):
             return [order, *([0.0, *aim.excesses(J)] for aim in found.values())]
 
         def limits(J: Sequence[Operand]) -> list[Operand]:
-            return [*tolerances(J), *(self._excesses_of_order(found, J) if self.ordered else ())]
+            return [*tolerance_limits(found, J), *(self._excesses_of_order(found, J) if self.ordered else ())]
 
         order = [f"{s} satisfied at least as {r}" for s, r in self.pairs] if self.ordered else []
-        return (Stage("1 - membership, order", value, groups, limits, (*limit_names, *order)),)
+        return (Stage("1 - membership, order", value, groups, limits, (*tolerance_names(found, goals), *order)),)
 
     def kappa(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
         """By how much the memberships violate the order of priority, (n,), at objectives (n, m); not above 0 where they keep it."""

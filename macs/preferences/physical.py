@@ -63,20 +63,13 @@ class PhysicalProgramming(Preference):
     def functions(self) -> dict[str, PreferenceFunction]:
         """The preference function of each objective, by name.
 
-        Raises
-        ------
-        ValueError
-            If lengths of ranges differ by too many orders of magnitude.
+        Raises ValueError if lengths of ranges differ by too many orders of magnitude.
         """
         return dict(zip(self.classes, preference_functions(list(self.classes.values()), self.beta), strict=True))
 
     def minimised(self) -> dict[str, Callable[[Operand], Operand]]:
         """What is averaged, by name."""
         return dict(self.functions)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.classes)
 
     def check(self, goals: Sequence[Objective]) -> None:
         """Raise ValueError for names that are none of these goals', and classes that go the other way."""

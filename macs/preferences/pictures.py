@@ -11,7 +11,8 @@ import numpy as np
 
 from problems.compiled import Objective
 
-from ..fronts.pictures.style import COLORS, GREY, STYLE, axis_label, better, new_figure, title_and_legend
+from ..fronts.pictures.front_plot import parallel_axes
+from ..fronts.pictures.style import COLORS, GREY, axis_label, better, new_figure, styled, title_and_legend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,36 +21,19 @@ SHADES = ("#d9efdf", "#e9f5e3", "#f9f7dc", "#fdeccf", "#fbdcc8", "#f3c9c4")
 """From ideal to unacceptable: light, so that curves and bars stand out; readers of any colour vision tell them by their order."""
 
 
-def shade_ranges(ax: Any, boundaries: Sequence[float], degree: Callable[[np.ndarray], np.ndarray], ends: tuple[float, float]) -> None:
-    """Shade upright bands between the boundaries of an objective by the degree in their middles."""
-    edges = [ends[0], *(b for b in sorted(boundaries) if ends[0] < b < ends[1]), ends[1]]
-    for low, high in pairwise(edges):
-        level = float(degree(np.array([0.5 * (low + high)]))[0])
-        ax.axvspan(low, high, color=SHADES[int(np.clip(np.floor(level), 0, 5))], lw=0, zorder=0)
-
-
-def shade_degrees(ax: Any, top: float) -> None:
-    """Shade level bands of degrees: below 1, 1 to 2, ..., beyond 5."""
-    for k, shade in enumerate(SHADES):
-        ax.axhspan(k, k + 1 if k < 5 else max(top, 6.0), color=shade, lw=0, zorder=0)
-
-
 def draw_degrees(
     degrees: Mapping[str, np.ndarray],
     groups: Sequence[str],
     label: str,
     levels: Sequence[tuple[float, str]],
     smaller: bool,
-    title: str = "",
     ax: Axes | None = None,
 ) -> Axes:
     """Axes with groups of bars, usually one for each objective, with one bar for each choice."""
-    import matplotlib
-
     values = np.array([*degrees.values()], dtype=float)
     shown = ~np.isnan(values).all(axis=0)
     values, names = values[:, shown], [name for name, one in zip(groups, shown, strict=True) if one]
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with styled():
         if ax is None:
             ax = new_figure(max(4.6, 1.2 + 0.45 * values.size), 3.4).add_subplot()
         width = 0.8 / len(values)
@@ -69,7 +53,8 @@ def draw_degrees(
         ax.set_ylabel(label)
         ax.grid(False, axis="x")
         if smaller:
-            shade_degrees(ax, 1.1 * top)
+            for k, shade in enumerate(SHADES):
+                ax.axhspan(k, k + 1 if k < 5 else max(1.1 * top, 6.0), color=shade, lw=0, zorder=0)
             ax.set_ylim(0.0, max(6.0, 1.1 * top))
             ax.grid(False)
             ax.set_yticks(range(6))
@@ -83,8 +68,6 @@ def draw_degrees(
             right.spines["right"].set_visible(False)
         ax.set_xlim(-0.55, len(names) - 0.45)
         ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=min(len(values), 4))
-        if title:
-            ax.set_title(title, loc="right", color=GREY)
     return ax
 
 
@@ -107,9 +90,7 @@ def draw_functions(
     curves: Sequence[Curve], title: str, heights: str, logarithmic: bool, points: np.ndarray, best: int | None, figure: Any = None
 ) -> np.ndarray:
     """Axes, one for each objective, with functions of it, the points (n, m) of a front on them, and the best of these marked."""
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with styled():
         columns = min(len(curves), 2 if len(curves) in (2, 4) else 3)
         rows = -(-len(curves) // columns)
         if figure is None:
@@ -130,7 +111,9 @@ def draw_functions(
 def _draw(curve: Curve, ax: Any, points: np.ndarray, best: int | None, logarithmic: bool) -> None:
     x = np.union1d(np.linspace(curve.low, curve.high, 801), [b for b in curve.boundaries if curve.low <= b <= curve.high])
     if curve.degree is not None:
-        shade_ranges(ax, curve.boundaries, curve.degree, (curve.low, curve.high))
+        for low, high in pairwise([curve.low, *(b for b in sorted(curve.boundaries) if curve.low < b < curve.high), curve.high]):
+            level = float(curve.degree(np.array([0.5 * (low + high)]))[0])
+            ax.axvspan(low, high, color=SHADES[int(np.clip(np.floor(level), 0, 5))], lw=0, zorder=0)
     for k, (name, function) in enumerate(curve.functions):
         style = {"color": COLORS[0], "lw": 1.5} if not k else {"color": GREY, "lw": 1.1, "ls": "--"}
         ax.plot(x, function(x), label=name, zorder=3 - 0.1 * k, **style)
@@ -158,9 +141,7 @@ def draw_ranking(front: Any, order: np.ndarray, apart: Mapping[str, np.ndarray],
 
     One objective is drawn against the place, two as a scatter plot, more as parallel coordinates. The best point is marked. order (n,).
     """
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):  # type: ignore[arg-type]
+    with styled():
         if ax is None:
             ax = new_figure(7.0 if len(front.goals) > 2 else 5.5, 4.0).add_subplot()
         place = np.empty(len(order), dtype=int)
@@ -190,11 +171,11 @@ def _scatter(front: Any, place: np.ndarray, apart: Mapping[str, np.ndarray], ax:
 
 def _parallel(front: Any, place: np.ndarray, apart: Mapping[str, np.ndarray], ax: Any) -> None:
     """Parallel coordinates, better at the top."""
-    met = ~np.any([*apart.values()], axis=0)
     import matplotlib
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
+    met = ~np.any([*apart.values()], axis=0)
     F = np.where(np.isfinite(front.F), front.F, np.nan)
     low, high = np.nanmin(F, axis=0), np.nanmax(F, axis=0)
     height = 1.0 - (F - low) / np.where(high > low, high - low, 1.0)
@@ -208,18 +189,7 @@ def _parallel(front: Any, place: np.ndarray, apart: Mapping[str, np.ndarray], ax
             ax.plot(height[i], color=shade(norm(place[i] + 1)), lw=1.0, alpha=0.85)
     ax.plot(height[best], color=BEST, lw=2.2, marker="o", ms=4, label=f"best (#{best})", zorder=4)
     _bar(ScalarMappable(norm, shade), ax)
-    for k, goal in enumerate(front.goals):
-        ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)
-        ax.text(k, 1.015, f"{goal.sign * low[k] + 0.0:.5g}", ha="center", va="bottom", fontsize=8)
-        ax.text(k, -0.015, f"{goal.sign * high[k] + 0.0:.5g}", ha="center", va="top", fontsize=8)
-    ax.grid(False)
-    ax.set_xlim(-0.3, len(front.goals) - 0.7)
-    ax.set_ylim(-0.12, 1.12)
-    ax.set_xticks(range(len(front.goals)), [f"{axis_label(goal.name, goal.unit)}\n{goal.sense[:3]}" for goal in front.goals])
-    ax.set_yticks([0, 1], ["worst", "best"])
-    ax.tick_params(length=0)
-    for side in ("left", "bottom"):
-        ax.spines[side].set_visible(False)
+    parallel_axes(ax, front.goals, low, high)
 
 
 def _bar(drawn: Any, ax: Any) -> None:

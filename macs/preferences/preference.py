@@ -18,7 +18,7 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..io.text import counted, numbers, text_table
-from .ranges import Ranges, confidence, places, usable
+from .ranges import Ranges, confidence, places, sense_and_unit
 from .stage import LIMIT_TOL, Stage, exceeded, ordering
 
 if TYPE_CHECKING:
@@ -41,14 +41,9 @@ class Preference(ABC):
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
     >>> from macs.decisions import Preference, WeightedSum
-    >>> wish = WeightedSum({"flight time": 1, "horizontal speed": 3})
-    >>> print(isinstance(wish, Preference), len(wish.rank(front).order))
-    True 3
+    >>> isinstance(WeightedSum({"flight time": 1, "horizontal speed": 3}), Preference)
+    True
     """
 
     DEGREE: ClassVar[str] = "degree"
@@ -71,9 +66,9 @@ class Preference(ABC):
         return f"{self.title} of {', '.join(self.names)}"
 
     @property
-    @abstractmethod
     def names(self) -> tuple[str, ...]:
-        """Names of the objectives that it speaks of."""
+        """Names of the objectives that it speaks of: by default, those by which its settings are given."""
+        return tuple(dict.fromkeys(name for settings in vars(self).values() if isinstance(settings, Mapping) for name in settings))
 
     def check(self, goals: Sequence[Objective]) -> None:
         """Raise ValueError for what can be told to be wrong without ranges: names that are none of these goals'."""
@@ -124,22 +119,22 @@ class Preference(ABC):
         """
         if not isinstance(front, Points):
             raise ValueError(f"a front is ranked, not {front!r}")
-        if not usable(front)[0].any():
+        if (confidence(front) == 2).all():
             raise ValueError(f"the front has no feasible point to rank{f': {front.message}' if front.message else ''}")
         ranges = Ranges.of(front) if ranges is None else ranges
         stages: Sequence[Stage] = self.stages(front.goals, ranges)
-        J, rank = front.objectives, standing(stages, front)
+        J, rank = front.objectives, standing(stages[0], front)
         with np.errstate(invalid="ignore"):
             tie = np.sum(ranges.normalised(front.goals, list(J.T)), axis=0)
-        found = ordering(stages, J, rank, tie)
+        order, values = ordering(stages, J, rank, tie)
         return Ranking(
             front,
             self,
             ranges,
-            found.values,
+            values,
             self.degrees(front.goals, ranges, J),
-            found.order,
-            _message(stages, front, rank, found.order),
+            order,
+            _message(stages[0], front, rank, order),
             tuple(stage.name for stage in stages),
         )
 
@@ -236,10 +231,8 @@ class Ranking:
 
     Examples
     --------
-    >>> from macs import sweep
-    >>> from problems import load
-    >>> from transcription import DFET
-    >>> front = sweep(load("goddard"), DFET(6, 6, basis="bernstein"), points=3, starts=1)
+    >>> import macs, problems
+    >>> front = macs.sweep(problems.load("goddard"), points=3, starts=1)
     >>> from macs.decisions import WeightedSum
     >>> ranking = WeightedSum({"flight time": 1, "horizontal speed": 0}).rank(front)
     >>> print(ranking.order[0])
@@ -283,7 +276,7 @@ class Ranking:
         titles, units, cells = ["rank", "#"], ["", ""], [[str(k + 1) for k in range(len(shown))], [str(i) for i in shown]]
         for goal, column in zip(front.goals, front.objectives[shown].T, strict=True):
             titles.append(goal.name)
-            units.append(f"{goal.sense[:3]} [{goal.unit or '-'}]")
+            units.append(sense_and_unit(goal))
             cells.append(numbers(column))
         for name, column in zip(self.stage_names, self.stage_values[shown].T, strict=True):
             if not np.isnan(column).all():
@@ -305,7 +298,7 @@ class Ranking:
         coordinates. Points that exceed a hard limit, are not feasible or not verified are hollow, or broken lines."""
         from .pictures import draw_ranking
 
-        doubtful = ~usable(self.front)[1]
+        doubtful = confidence(self.front) > 0
         apart = {"exceeds a hard limit": ~np.isfinite(self.values) & ~doubtful, "not feasible or not verified": doubtful}
         return draw_ranking(self.front, self.order, apart, self.preference.title, ax)
 
@@ -326,7 +319,7 @@ def needed(ranges: Ranges | None, preference: Preference) -> Ranges:
     return ranges
 
 
-def standing(stages: Sequence[Stage], points: Points, verify: float | None = None) -> np.ndarray:
+def standing(limits: Stage, points: Points, verify: float | None = None) -> np.ndarray:
     """What comes before all preference: the standing (n,) of each point among others; less is better.
 
     0: within the hard limits, and no simulation contradicts it; 1: within them, but a simulation contradicts it; 2, 3: the same beyond
@@ -335,9 +328,7 @@ def standing(stages: Sequence[Stage], points: Points, verify: float | None = Non
     limits only if what was simulated is, too, but for `verify`.
     """
     sure, missed = confidence(points), verify or points.stats.get("verify") or VERIFY
-    claimed, simulated = (
-        np.max([stage.excess(J) for stage in stages], axis=0) for J in (points.objectives, points.simulated_F * points.signs)
-    )
+    claimed, simulated = limits.excess(points.objectives), limits.excess(points.simulated_F * points.signs)
     beyond = (claimed > LIMIT_TOL) | ((sure == DOUBTFUL) & (simulated > missed))
     return np.where(sure <= DOUBTFUL, sure + np.where(beyond, BEYOND, CONFIRMED), INFEASIBLE)
 
@@ -349,24 +340,22 @@ def within_limits(limits: Stage, point: Point) -> bool:
 
 def keeps_limits(limits: Stage, point: Point, verify: float) -> bool:
     """Whether a feasible point is within the limits of a stage, as far as `standing` tells."""
-    return bool(standing([limits], point.alone(), verify)[0] < BEYOND)
+    return bool(standing(limits, point.alone(), verify)[0] < BEYOND)
 
 
-def _message(stages: Sequence[Stage], front: Points, rank: np.ndarray, order: np.ndarray) -> str:
+def _message(limits: Stage, front: Points, rank: np.ndarray, order: np.ndarray) -> str:
     """What is to be known about the best point."""
     best, parts = rank[order[0]], []
     if best >= BEYOND:
         J = front.objectives[rank < INFEASIBLE]
-        most = [(stage, np.min(stage.excesses(J), axis=0)) for stage in stages]
-        never = [name for stage, least in most for value, name in zip(least, stage.titles(len(least)), strict=True) if value > LIMIT_TOL]
-        claimed = (np.max([stage.excess(J) for stage in stages], axis=0) <= LIMIT_TOL).any()
-        how = "; none has " + ", nor ".join(dict.fromkeys(never)) if never else " when simulated" if claimed else " together"
+        least = np.min(limits.excesses(J), axis=0)
+        never = [name for value, name in zip(least, limits.titles(len(least)), strict=True) if value > LIMIT_TOL]
+        claimed = (limits.excess(J) <= LIMIT_TOL).any()
+        how = "; none has " + ", nor ".join(never) if never else " when simulated" if claimed else " together"
         parts.append(f"No point meets all hard limits{how}.")
     nearest = [int(i) for i in order if rank[i] == BEYOND]
     if best == DOUBTFUL and nearest:
-        # Stages may share their limits.
-        each = dict.fromkeys(exceeded(stage, front.goals, front.objectives[nearest[0]]) for stage in stages)
-        missed = ", ".join(filter(None, each))
+        missed = exceeded(limits, front.goals, front.objectives[nearest[0]])
         parts.append(f"The best point is not confirmed by a simulation; confirmed ones exceed hard limits: of the nearest, {missed}.")
     elif best in (DOUBTFUL, BEYOND_AND_DOUBTFUL):
         parts.append("No point was confirmed by a simulation.")

@@ -18,7 +18,7 @@ import numpy as np
 from problems.checks import number
 from problems.compiled import Objective
 
-from .ranges import shown
+from .ranges import limit_name
 from .stage import NUMERIC, Operand, clipped, exp, greatest, least
 
 RANGE_NAMES = ("ideal", "desirable", "tolerable", "undesirable", "highly undesirable", "unacceptable")
@@ -73,8 +73,15 @@ class ObjectiveClass:
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        """The sides on which the objective becomes worse: towards larger values first."""
-        raise NotImplementedError
+        """The side on which the objective becomes worse; of two, that of larger values first."""
+        if self.SENSE is not None:
+            return (Side(1.0 if self.RISING else -1.0, self.boundaries),)
+        return Side(1.0, self.boundaries[-BOUNDARIES:]), Side(-1.0, self.boundaries[BOUNDARIES - 1 :: -1])
+
+    @classmethod
+    def even(cls, first: float, last: float) -> Self:
+        """Boundaries of `Smaller` or `Larger` in equal steps from J1 to J5."""
+        return cls(*np.linspace(first, last, BOUNDARIES).tolist())
 
     def check(self, goal: Objective) -> None:
         """Raise ValueError if the problem moves this objective the other way."""
@@ -83,41 +90,18 @@ class ObjectiveClass:
 
     def limits(self, J: Operand) -> list[Operand]:
         """Excess over J_5 on each side, in lengths from J_1 to J_5: at most 0."""
-        ends = [(side.direction / float(side.lengths.sum()), side.boundaries[-1]) for side in self.sides]
-        return [slope * (J - last) for slope, last in ends]
+        return [side.direction / float(side.lengths.sum()) * (J - side.boundaries[-1]) for side in self.sides]
 
     def limit_names(self, goal: Objective) -> tuple[str, ...]:
         """What each limit says."""
-        words = ["at most" if side.direction > 0 else "at least" for side in self.sides]
-        return tuple(f"{goal.name} {word} {shown(side.boundaries[-1], goal)}" for word, side in zip(words, self.sides, strict=True))
+        return tuple(limit_name(goal, side.direction, side.boundaries[-1]) for side in self.sides)
 
     def degree(self, J: np.ndarray) -> np.ndarray:
         """Degree of values J (n,): k at the boundary J_k, below 1 where ideal, above 5 where unacceptable."""
         return np.max([side.degree(J) for side in self.sides], axis=0)
 
 
-class OneSided(ObjectiveClass):
-    """An objective that becomes worse in one direction."""
-
-    @classmethod
-    def even(cls, first: float, last: float) -> Self:
-        """Boundaries in equal steps from J1 to J5."""
-        return cls(*np.linspace(first, last, BOUNDARIES).tolist())
-
-    @property
-    def sides(self) -> tuple[Side, ...]:
-        return (Side(1.0 if self.RISING else -1.0, self.boundaries),)
-
-
-class TwoSided(ObjectiveClass):
-    """An objective that becomes worse in both directions."""
-
-    @property
-    def sides(self) -> tuple[Side, ...]:
-        return Side(1.0, self.boundaries[-BOUNDARIES:]), Side(-1.0, self.boundaries[BOUNDARIES - 1 :: -1])
-
-
-class Smaller(OneSided):
+class Smaller(ObjectiveClass):
     """Smaller is better (class 1S): `Smaller(J1, J2, J3, J4, J5)`, increasing.
 
     Up to J1 the objective is ideal, then desirable, tolerable, undesirable, highly undesirable, and beyond J5 unacceptable.
@@ -137,7 +121,7 @@ class Smaller(OneSided):
     SENSE = "minimize"
 
 
-class Larger(OneSided):
+class Larger(ObjectiveClass):
     """Larger is better (class 2S): `Larger(J1, J2, J3, J4, J5)`, decreasing.
 
     Parameters
@@ -156,7 +140,7 @@ class Larger(OneSided):
     SENSE = "maximize"
 
 
-class Value(TwoSided):
+class Value(ObjectiveClass):
     """A value is best (class 3S): `Value(J5, J4, J3, J2, J1, J2, J3, J4, J5)`, increasing; the fifth is the ideal value J1.
 
     Parameters
@@ -178,7 +162,7 @@ class Value(TwoSided):
         return np.max([np.maximum(side.degree(J), 1.0) for side in self.sides], axis=0)
 
 
-class Range(TwoSided):
+class Range(ObjectiveClass):
     """A range is best (class 4S): `Range(J5, J4, J3, J2, J1, J1, J2, J3, J4, J5)`, increasing; the range between the two J1 is ideal.
 
     Parameters
@@ -296,9 +280,7 @@ class Piece:
 
     def holds(self, x: Operand) -> Operand:
         """1 where the formula holds, else 0; each value belongs to one piece."""
-        if math.isinf(self.upper):
-            return 1.0 * (x > self.lower)
-        return 1.0 * (x <= self.upper) if math.isinf(self.lower) else 1.0 * (x > self.lower) * (x <= self.upper)
+        return 1.0 * (x > self.lower) * (x <= self.upper)
 
 
 @dataclass(frozen=True)

@@ -79,6 +79,16 @@ def shown(value: float, goal: Objective) -> str:
     return f"{value:.6g}{f' {goal.unit}' if goal.unit else ''}"
 
 
+def limit_name(goal: Objective, side: float, limit: float) -> str:
+    """What a limit of an objective says: that it is at most this large, or on the negative side at least."""
+    return f"{goal.name} {'at most' if side > 0 else 'at least'} {shown(limit, goal)}"
+
+
+def sense_and_unit(goal: Objective) -> str:
+    """What stands below the name of an objective in a table."""
+    return f"{goal.sense[:3]} [{goal.unit or '-'}]"
+
+
 def levels(priorities: Any) -> tuple[tuple[str, ...], ...]:
     """Levels of priority, most important first, each a tuple of names; no name occurs twice."""
     if isinstance(priorities, str) or not isinstance(priorities, Sequence) or not priorities:
@@ -122,15 +132,13 @@ class Ranges:
         Points that a simulation did not confirm do not count, but for two cases. A payoff table keeps all its ends: without one of them it
         has no ranges. And where fewer than two confirmed points are left, all feasible points count.
 
-        Raises
-        ------
-        ValueError
-            If no point is feasible.
+        Raises ValueError if no point is feasible.
         """
         if not isinstance(front, Points):
             raise ValueError(f"ranges are those of a front or a payoff table, not of {front!r}")
-        feasible, confirmed = usable(front)
-        kept = feasible if front.solver.get("name") == PAYOFF else confirmed
+        doubt = confidence(front)
+        feasible = doubt < 2
+        kept = feasible if front.solver.get("name") == PAYOFF else doubt == 0
         if not feasible.any():
             raise ValueError(f"the front has no feasible point, so that it has no ranges{f': {front.message}' if front.message else ''}")
         F = front.F[kept][nondominated(front.F[kept])]
@@ -154,10 +162,7 @@ class Ranges:
     def ends(self, goals: Sequence[Objective]) -> tuple[np.ndarray, np.ndarray]:
         """The best and the worst values (m,) of these goals.
 
-        Raises
-        ------
-        ValueError
-            If a goal has no range, if a range is of none of the goals, and if a worst value is better than the best.
+        Raises ValueError if a goal has no range, if a range is of none of the goals, and if a worst value is better than the best.
         """
         places(self.best, goals)
         for goal in goals:
@@ -195,11 +200,5 @@ class Ranges:
 
 def confidence(front: Points) -> np.ndarray:
     """How far each point (n,) is to be believed: 0 feasible, and no simulation contradicts it; 1 feasible; 2 neither."""
-    feasible, confirmed = usable(front)
-    return np.where(confirmed, 0, np.where(feasible, 1, 2))
-
-
-def usable(front: Points) -> tuple[np.ndarray, np.ndarray]:
-    """Masks (n,) of the feasible points, and of those among them that no simulation contradicts."""
     feasible = (front.status == CONVERGED) & np.isfinite(front.F).all(axis=1)
-    return feasible, feasible & ~(front.was_simulated & ~front.verified)
+    return np.where(feasible, front.was_simulated & ~front.verified, 2)

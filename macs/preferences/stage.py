@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -70,7 +70,7 @@ class Stage:
     groups : callable (J) -> list of lists of Operand
         `peaks[k]` is the largest of `groups[k]`.
     limits : callable (J) -> list of Operand
-        Hard limits, each at most 0, without dimension.
+        Hard limits, each at most 0, without dimension. Of several stages the first has them all.
     limit_names : tuple of str
         What each limit says; none: they are called by their numbers, see `titles`.
     after_zero : bool
@@ -91,6 +91,11 @@ class Stage:
     limits: Callable[[Sequence[Operand]], list[Operand]] = no_limits
     limit_names: tuple[str, ...] = ()
     after_zero: bool = False
+
+    @property
+    def limited(self) -> bool:
+        """Whether it has hard limits."""
+        return self.limits is not no_limits
 
     def numbers(self, objectives: np.ndarray) -> np.ndarray:
         """Values (n,) at objectives (n, m); infinite where an objective is not finite or a limit is exceeded."""
@@ -146,22 +151,6 @@ def _columns(objectives: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
     return list(np.where(good[:, None], objectives, 0.0).T), good
 
 
-def with_all_limits(stages: Sequence[Stage], m: int) -> list[Stage]:
-    """The stages of m objectives, of which the first has all limits: the later ones keep it, and so have them, too. Those of one name are
-    one limit; without names, each is one of its own."""
-    places: dict[str | tuple[int, int], tuple[int, int, str]] = {}
-    for i, stage in enumerate(stages):
-        for k, name in enumerate(stage.titles(len(stage.limits([1.0] * m)))):
-            places.setdefault(name if stage.limit_names else (i, k), (i, k, name))
-
-    def every(J: Sequence[Any]) -> list[Any]:
-        found = [stage.limits(J) for stage in stages]
-        return [found[i][k] for i, k, _ in places.values()]
-
-    bare = [replace(stage, limits=no_limits, limit_names=()) for stage in stages]
-    return [replace(bare[0], limits=every, limit_names=tuple(name for _, _, name in places.values())), *bare[1:]]
-
-
 def excess_stage(limits: Stage) -> Stage:
     """The stage of which the value is the largest excess over the limits of another."""
     return Stage("largest excess over hard limits", lambda J, peaks: peaks[0], lambda J: [limits.limits(J)])
@@ -177,34 +166,27 @@ def conflict_message(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -
     return f"no point was found that meets {what}; the nearest has {nearest}: {exceeded(limits, goals, J)}"
 
 
-@dataclass(frozen=True, eq=False)
-class Ordering:
-    """Points in the order of a preference."""
-
-    # (n, number of stages): Of the stages: smaller is better, infinite where a hard limit is exceeded or an objective is not finite, NaN
-    # where a stage does not follow (see `Stage.after_zero`).
-    values: np.ndarray
-    excess: np.ndarray  # (n,): By how much the hard limits are exceeded, 0 where they are met
-    order: np.ndarray  # (n,): Rows, best first
-
-
 def ordering(
     stages: Sequence[Stage], objectives: np.ndarray, kind: np.ndarray, tie: np.ndarray | None = None, same: float = ATTAINED
-) -> Ordering:
-    """Points by their kind, then by the excess over hard limits, then by the stages, each as far as those before tell no difference.
-    objectives (n, m), kind (n,), tie (n,)."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (n,) of points in the order of a preference, best first: by their kind, then by the excess over hard limits, then by the stages,
+    each as far as those before tell no difference; and the values (n, number of stages), see `Ranking`. objectives (n, m), kind (n,), tie
+    (n,)."""
     columns: list[np.ndarray] = []
     for stage in stages:
         found = stage.numbers(objectives)
         follows = columns[-1] <= same if columns and stage.after_zero else np.ones(len(found), dtype=bool)
         columns.append(np.where(follows, found, np.nan))
-    excess = np.max([stage.excess(objectives) for stage in stages], axis=0)
+    for stage in stages[1:]:
+        if stage.limited:
+            raise ValueError(f"hard limits are those of the first stage: '{stage.name}' has some, too")
+    excess = stages[0].excess(objectives)
     excess = np.where(excess > LIMIT_TOL, excess, 0.0)
     keys = [*((kind, 0.0), (excess, 0.0)), *((one, same) for one in columns[:-1]), (columns[-1], 0.0)]
     if tie is not None:
         keys.append((tie, 0.0))
     order = _sorted(np.arange(len(excess)), [(np.where(np.isnan(key), 0.0, key), slack) for key, slack in keys])
-    return Ordering(np.stack(columns, axis=1), excess, order)
+    return order, np.stack(columns, axis=1)
 
 
 def _sorted(rows: np.ndarray, keys: Sequence[tuple[np.ndarray, float]]) -> np.ndarray:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from macs.decisions import FuzzySatisfactory, Preference, Ranges, from_dict
 from macs.fronts.pictures.style import COLORS
 from macs.fronts.point import Point
 from macs.io.text import label
-from macs.preferences import FuzzySatisfactory, Preference, Ranges, from_dict
 from macs.preferences.pictures import draw_degrees
 
 from .comparison import Comparison

@@ -13,8 +13,8 @@ import numpy as np
 from msgspec import Meta
 
 from macs.baselines.population import PopulationSolver
+from macs.decisions import FuzzySatisfactory, Preference, Ranges, from_dict
 from macs.io.text import counted
-from macs.preferences import FuzzySatisfactory, Preference, Ranges, from_dict
 from problems.checks import unknown
 from problems.compiled import Objective
 

@@ -54,11 +54,6 @@ def test_an_objective_that_does_not_enter_has_no_axes() -> None:
     assert np.interp([7.5, 15.0, 20.0], x, y) == pytest.approx([0.5, 1.0, 1.0], abs=1e-3)
 
 
-def test_functions_of_physical_programming_are_logarithmic() -> None:
-    (only,) = PhysicalProgramming({"a": Smaller(1.0, 2.0, 3.0, 4.0, 5.0)}).plot_functions(FRONT)
-    assert only.get_yscale() == "log"
-
-
 # Bars
 
 
@@ -81,6 +76,8 @@ def test_where_smaller_degrees_are_better_the_axis_has_the_ranges_of_preference(
     ax = PhysicalProgramming({"a": Smaller(1.0, 2.0, 3.0, 4.0, 5.0)}).plot_degrees({"first": FRONT[1]})
     assert ax.get_ylim() == (0.0, 6.0) and [one.get_text() for one in ax.get_xticklabels()] == ["a"]
     assert any(words for words in ax.child_axes[0].get_yticklabels())
+    (only,) = PhysicalProgramming({"a": Smaller(1.0, 2.0, 3.0, 4.0, 5.0)}).plot_functions(FRONT)
+    assert only.get_yscale() == "log"
 
 
 def test_degrees_are_of_points_of_one_problem() -> None:
@@ -101,12 +98,3 @@ def test_what_it_speaks_of_is_said_and_checked() -> None:
     EVEN.check((A, B))
     with pytest.raises(ValueError, match=r"^unknown objective 'b'"):
         EVEN.check((A,))
-
-
-def test_ranks_are_those_by_the_ranges_that_are_given() -> None:
-    """In the ranges of the front the last point is best, in ranges in which b hardly counts the first."""
-    assert EVEN.rank(FRONT).best.index == 1
-    assert EVEN.rank(FRONT, Ranges({"a": 0.0, "b": 1e3}, {"a": 10.0, "b": 0.0})).best.index == 0
-    for ranges in (None, {"a": (0.0, 1.0)}):
-        with pytest.raises(ValueError, match=r"^WeightedSum needs the ranges of the objectives: Ranges.of\(front\), not "):
-            EVEN.stages((A, B), ranges)  # type: ignore[arg-type]

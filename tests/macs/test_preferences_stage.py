@@ -1,19 +1,18 @@
-"""Stages on their own: operands, values, excesses over limits and their words, the order of points; and a preference of the user's own."""
+"""Stages: operands, values, hard limits and what is said of them, the order of points; and a preference of the user's own."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
-from choices import cart
+from choices import cart, plain_front
 
 from macs.decisions import Preference, Stage
-from macs.preferences.stage import LIMIT_TOL, clipped, exceeded, exp, greatest, least, log10, ordering
+from macs.preferences.preference import keeps_limits, within_limits
+from macs.preferences.stage import LIMIT_TOL, conflict_message, exceeded, ordering
 from problems.compiled import Objective
 
 GOALS = (Objective("time", "s"), Objective("mass", "kg", "maximize"), Objective("risk"))
@@ -53,15 +52,6 @@ def test_what_exceeds_a_limit_has_no_value() -> None:
     assert Stage("one", lambda J, peaks: J[0], limits=lambda J: [0.5]).excess(rows((1.0,), (2.0,))).tolist() == [0.5, 0.5]
 
 
-def test_what_is_exactly_at_the_slack_is_met_for_all() -> None:
-    stage = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[0]])
-    for amount, met in ((LIMIT_TOL, True), (np.nextafter(LIMIT_TOL, 1.0), False)):
-        J = rows((amount, 0.0, 0.0))
-        assert bool(np.isfinite(stage.numbers(J)[0])) is met
-        assert (exceeded(stage, GOALS, J[0]) == "") is met
-        assert bool(ordering([stage], J, np.zeros(1)).excess[0] == 0.0) is met
-
-
 def test_without_limits_nothing_is_exceeded_but_by_what_is_no_number() -> None:
     J = rows((1.0, 2.0), (np.nan, 2.0), (1.0, np.inf), (-np.inf, 0.0))
     assert FREE.excess(J).tolist() == [0.0, 0.0, 0.0, 0.0] and FREE.excesses(J).shape == (4, 0)
@@ -76,11 +66,6 @@ def test_values_that_are_no_numbers_do_not_warn() -> None:
         rows((0.0,), (4.0,))
     )
     assert found.tolist() == [np.inf, 2.0]
-
-
-def test_what_limits_say() -> None:
-    assert LIMITED.titles(3) == LIMITED.limit_names
-    assert FREE.titles(2) == ("limit 1 of first", "limit 2 of first") and FREE.titles(0) == ()
 
 
 def test_what_is_missed_is_said_in_the_unit_of_its_objective() -> None:
@@ -103,25 +88,21 @@ def test_what_is_missed_is_said_in_the_unit_of_its_objective() -> None:
 
 
 def ordered(stages: Any, J: np.ndarray, **more: Any) -> list[int]:
-    return ordering(stages, J, more.pop("kind", np.zeros(len(J))), **more).order.tolist()
+    return ordering(stages, J, more.pop("kind", np.zeros(len(J))), **more)[0].tolist()
 
 
 def test_the_kind_comes_first_then_the_limits_and_then_the_values() -> None:
     limited = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1] - 1.0])
     J = rows((4.0, 0.0), (3.0, 1.0), (0.0, 2.0), (0.0, 1.5), (0.0, 0.0))
-    found = ordering([limited], J, np.array([0, 0, 0, 0, 1]))
-    assert found.order.tolist() == [1, 0, 3, 2, 4]
-    assert found.excess.tolist() == [0.0, 0.0, 1.0, 0.5, 0.0]
-    assert found.values[:, 0].tolist() == [4.0, 3.0, np.inf, np.inf, 0.0]
+    order, values = ordering([limited], J, np.array([0, 0, 0, 0, 1]))
+    assert order.tolist() == [1, 0, 3, 2, 4] and values[:, 0].tolist() == [4.0, 3.0, np.inf, np.inf, 0.0]
     # Rounding is no excess, so that it does not order.
-    assert ordering([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * LIMIT_TOL)), np.zeros(2)).excess.tolist() == [0.0, 0.0]
     assert ordered([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * LIMIT_TOL))) == [1, 0]
 
 
-def test_limits_of_all_stages_count() -> None:
-    second = Stage("second", lambda J, peaks: J[0], limits=lambda J: [J[1] - 1.0])
-    found = ordering([FREE, second], rows((1.0, 3.0), (2.0, 0.0)), np.zeros(2))
-    assert found.order.tolist() == [1, 0] and found.excess.tolist() == [2.0, 0.0] and found.values.tolist() == [[1.0, np.inf], [2.0, 2.0]]
+def test_limits_are_those_of_the_first_stage() -> None:
+    with pytest.raises(ValueError, match="hard limits are those of the first stage: 'limited' has some, too"):
+        ordering([FREE, LIMITED], rows((1.0, 7.0, 3.0)), np.zeros(1))
 
 
 def test_later_stages_tell_apart_what_is_as_good_as_the_best() -> None:
@@ -140,9 +121,8 @@ def test_later_stages_tell_apart_what_is_as_good_as_the_best() -> None:
 def test_a_stage_that_follows_on_zero_follows_nowhere_else() -> None:
     missing = Stage("missing", lambda J, peaks: J[0])
     rest = Stage("rest", lambda J, peaks: J[1], after_zero=True)
-    found = ordering([missing, rest], rows((0.0, 3.0), (1e-10, 2.0), (1.0, 0.0), (1.0, -1.0)), np.zeros(4))
-    assert found.values[:, 1].tolist() == pytest.approx([3.0, 2.0, np.nan, np.nan], nan_ok=True)
-    assert found.order.tolist() == [1, 0, 2, 3]
+    order, values = ordering([missing, rest], rows((0.0, 3.0), (1e-10, 2.0), (1.0, 0.0), (1.0, -1.0)), np.zeros(4))
+    assert values[:, 1].tolist() == pytest.approx([3.0, 2.0, np.nan, np.nan], nan_ok=True) and order.tolist() == [1, 0, 2, 3]
 
 
 def test_ties_are_told_apart_by_what_is_given_or_keep_their_places() -> None:
@@ -157,38 +137,6 @@ def test_ties_are_told_apart_by_what_is_given_or_keep_their_places() -> None:
 def test_what_has_no_value_comes_last_and_keeps_its_places() -> None:
     limited = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1]])
     assert ordered([limited, FREE], rows((1.0, np.nan), (0.0, np.inf), (2.0, 0.0), (0.0, 0.5), (1.0, 0.5))) == [2, 3, 4, 0, 1]
-
-
-# Operands
-
-
-ALL: dict[str, tuple[Callable[[Any], Any], Callable[[float], float]]] = {
-    "exp": (exp, math.exp),
-    "log10": (log10, math.log10),
-    "greatest": (lambda x: greatest(x, 2.0), lambda x: max(x, 2.0)),
-    "least": (lambda x: least(x, 2.0), lambda x: min(x, 2.0)),
-    "clipped": (lambda x: clipped(x, 1.5, 3.0), lambda x: min(max(x, 1.5), 3.0)),
-}
-
-
-@pytest.mark.filterwarnings("error")  # CasADi warns of numpy's functions on its symbols
-@pytest.mark.parametrize("name", ALL)
-def test_all_operands_give_the_same(name: str) -> None:
-    function, expected = ALL[name]
-    for x in (0.25, 1.0, 2.0, 2.5, 10.0):
-        for operand in (x, np.float64(x), np.array([x]), np.float32(x)):
-            assert np.ravel(function(operand)) == pytest.approx([expected(x)], rel=1e-6)
-        if x == int(x):
-            assert function(int(x)) == pytest.approx(expected(x))
-        for kind in (ca.SX, ca.MX):
-            symbol = kind.sym("x")
-            assert float(ca.Function("f", [symbol], [function(symbol)])(x)) == pytest.approx(expected(x))
-
-
-def test_arrays_are_taken_element_by_element() -> None:
-    x = np.array([[0.0, 2.0], [4.0, np.inf]])
-    assert clipped(x, 1.0, 3.0).tolist() == [[1.0, 2.0], [3.0, 3.0]]
-    assert greatest(np.array([np.nan, 1.0]), 0.0).tolist() == [0.0, 1.0], "what is no number counts as nothing"
 
 
 # A preference that a user writes
@@ -222,3 +170,56 @@ def test_limits_without_names_are_told_by_their_numbers_where_no_point_meets_the
     ranking = Quick(1.0).rank(cart(3))
     assert ranking.message == "No point meets all hard limits; none has limit 1 of effort."
     assert ranking.best.objectives["time"] == pytest.approx(1.2)
+
+
+# Hard limits: what is within them, and what is said where no point is
+
+
+TIME, MASS = Objective("time", "s"), Objective("mass")
+
+
+def limited(*bounds: tuple[int, float, str]) -> Stage:
+    """A stage with the value of the first objective, and upper limits of some."""
+    names = tuple(words for _, _, words in bounds)
+    return Stage("cheap", lambda J, peaks: J[0], limits=lambda J: [J[i] - most for i, most, _ in bounds], limit_names=names)
+
+
+def at(*objectives: float, **columns: Any) -> Any:
+    """A point with these objectives."""
+    return plain_front(np.array([objectives]), [TIME, MASS], **columns)[0]
+
+
+@pytest.mark.parametrize(("share", "within"), [(-1.0, True), (0.0, True), (1.0, True), (1.1, False), (1e6, False)])
+def test_rounding_does_not_count_as_beyond_a_limit(share: float, within: bool) -> None:
+    """What is met has a value, what is not has none: both are told by the same slack, exactly."""
+    stage, point = limited((0, 0.0, "time at most 0")), at(share * LIMIT_TOL, 1.0)
+    assert within_limits(stage, point) is within
+    assert keeps_limits(stage, point, 1e-3) is within
+    assert np.isfinite(stage.numbers(np.array([[*point.objectives.values()]]))[0]) == within
+
+
+def test_what_was_simulated_keeps_a_limit_as_far_as_simulations_may_miss_it() -> None:
+    """A point of a time of 2 that flies 3.05: half a tenth beyond the limit of 3."""
+    stage = limited((0, 3.0, "time at most 3"))
+    flown = {"defect": [0.5], "simulated_violation": [0.0], "simulated_F": [[3.05, 1.0]], "verified": [False]}
+    point = at(2.0, 1.0, **flown)
+    assert point.verified is False and within_limits(stage, point)
+    assert keeps_limits(stage, point, 0.1) and not keeps_limits(stage, point, 0.01)
+
+
+def test_only_limits_in_conflict_are_named_and_what_the_nearest_misses() -> None:
+    """Limits are in conflict that are exceeded at least half as much as the one that is exceeded most."""
+    stage = limited((0, 3.0, "time at most 3 s"), (1, 5.0, "mass at most 5"), (1, 5.5, "mass at most 5.5"))
+    assert conflict_message(stage, (TIME, MASS), np.array([4.0, 7.0])) == (
+        "no point was found that meets all of: time at most 3 s, mass at most 5, mass at most 5.5; the nearest has time 4 s, mass 7:"
+        " 'time at most 3 s' is missed by 1 s, 'mass at most 5' is missed by 2, 'mass at most 5.5' is missed by 1.5"
+    )
+    words = conflict_message(stage, (TIME, MASS), np.array([3.99, 7.0]))
+    assert "meets all of: mass at most 5, mass at most 5.5;" in words and "'time at most 3 s' is missed by 0.99 s" in words
+
+
+@pytest.mark.parametrize(("J", "name"), [((9.0, 0.0), "short"), ((0.0, 9.0), "light")])
+def test_a_single_limit_is_named_alone(J: tuple[float, float], name: str) -> None:
+    words = conflict_message(limited((0, 3.0, "short"), (1, 5.0, "light")), (TIME, MASS), np.array(J))
+    assert words.startswith(f"no point was found that meets {name}; the nearest has time {J[0]:g} s, mass {J[1]:g}: '{name}' is missed by")
+    assert "all of" not in words

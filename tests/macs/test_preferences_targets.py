@@ -28,21 +28,6 @@ def chosen(preference, front=FRONT) -> float:
     return preference.rank(front).best.objectives["time"]
 
 
-@pytest.mark.parametrize(("time", "other"), [(1.0, 1.0), (0.1, 0.9), (3.0, 7.0)])
-def test_weighted_sum_is_where_weighted_slopes_are_equal(time, other):
-    ranking = WeightedSum({"time": time, "effort": other}).rank(FRONT)
-    T = balanced(time / DT, other / DE)
-    assert ranking.best.objectives["time"] == pytest.approx(T, abs=STEP)
-    assert ranking.values.min() == pytest.approx(time * (T - T0) / DT + other * (effort(T) - E0) / DE, rel=1e-6)
-
-
-def test_a_goal_that_is_met_does_not_count_further():
-    # The balance would be at T = 2.5; the target of the time is met there, and the effort falls until it is not met.
-    T = balanced(1 / DT, 1 / DE)
-    assert chosen(GoalProgramming({"time": T + 0.3, "effort": E0})) == pytest.approx(T + 0.3, abs=STEP)
-    assert chosen(GoalProgramming({"time": T0, "effort": effort(T - 0.3)})) == pytest.approx(T - 0.3, abs=STEP)
-
-
 def test_where_all_goals_are_met_the_point_is_not_dominated():
     ranking = GoalProgramming({"time": 3.5, "effort": 3.0}).rank(FRONT)
     assert ranking.best.objectives["time"] == pytest.approx(balanced(1 / DT, 1 / DE), abs=STEP)
@@ -62,15 +47,6 @@ def test_priorities_come_one_after_the_other():
     ranking = first_time.rank(FRONT)
     assert ranking.stage_names == ("priority 1", "priority 2", "sum of all")
     assert list(first_time.rank(FRONT).order) == list(np.lexsort([np.maximum(FRONT.F[:, 1] - 0.3, 0), np.maximum(FRONT.F[:, 0] - 2, 0)]))
-
-
-def test_the_least_membership_is_best_where_both_are_equal():
-    wanted, hoped = 1.5, 0.5
-    T = brentq(lambda T: (T - wanted) / (T1 - wanted) - (effort(T) - hoped) / (E1 - hoped), T0, T1)
-    ranking = FuzzyGoal({"time": wanted, "effort": hoped}).rank(FRONT)
-    assert ranking.best.objectives["time"] == pytest.approx(T, abs=STEP)
-    assert ranking.degrees[ranking.order[0]] == pytest.approx(1 - (T - wanted) / (T1 - wanted), abs=1e-3)
-    assert ranking.values[ranking.order[0]] == pytest.approx((T - wanted) / (T1 - wanted), abs=1e-3)
 
 
 def test_beyond_a_tolerance_no_point_is_acceptable():
@@ -95,36 +71,6 @@ def test_eq_53_weighs_two_memberships(regulating):
     value = (0.5 + regulating) * d[:, 0] + (0.5 - regulating) * d[:, 1]
     assert preference.rank(FRONT).values == pytest.approx(value, abs=1e-12)
     assert preference.kappa(FRONT.goals, Ranges.of(FRONT), FRONT.objectives) == pytest.approx(d[:, 0] - d[:, 1], abs=1e-12)
-
-
-def test_an_order_that_is_a_limit_is_kept():
-    free = FuzzySatisfactory({}, ["time", "effort"], regulating=0.0).rank(FRONT)
-    kept = FuzzySatisfactory({}, ["time", "effort"], regulating=0.0, ordered=True).rank(FRONT)
-    kappa = free.preference.kappa(FRONT.goals, free.ranges, FRONT.objectives)
-    assert kappa[free.order[0]] > 0
-    T = brentq(lambda T: (T - T0) / DT - (effort(T) - E0) / DE, T0 + 0.1, T1 - 0.1)
-    assert kept.best.objectives["time"] == pytest.approx(T, abs=STEP)
-    assert np.isinf(kept.values[kappa > 1e-5]).all()
-
-
-def test_aspirations_are_missed_alike():
-    preference = ReferencePoint({"time": 1.5, "effort": 0.5}, {"time": 2.5, "effort": 3.0}, augmentation=0.0)
-    T = brentq(lambda T: (T - 1.5) / 1.0 - (effort(T) - 0.5) / 2.5, T0, T1)
-    ranking = preference.rank(FRONT)
-    assert ranking.best.objectives["time"] == pytest.approx(T, abs=STEP)
-    assert ranking.values.min() == pytest.approx(T - 1.5, abs=2 * STEP)
-    J = np.array([[1.5, 3.0], [2.5, 0.5], [0.5, 8.0]])
-    assert preference.degrees(FRONT.goals, Ranges.of(FRONT), J) == pytest.approx(np.array([[1.0, 0.0], [0.0, 1.0], [2.0, -2.0]]))
-
-
-def test_nimbus_moves_until_its_limit():
-    current = {"time": 2.0, "effort": 1.5}
-    T = (12 / 3.0) ** (1 / 3)
-    ranking = Nimbus(current, improve=["time"], until={"effort": 3.0}).rank(FRONT)
-    assert ranking.best.objectives["time"] == pytest.approx(T, abs=STEP)
-    assert ranking.degrees[ranking.order[0]] == pytest.approx([(2.0 - T) / (2.0 - T0), 1.0], abs=1e-3)
-    assert np.isinf(ranking.values[FRONT.F[:, 0] > 2.0 + 1e-5]).all()
-    assert np.isinf(ranking.values[FRONT.F[:, 1] > 3.0 + 1e-4]).all()
 
 
 WANTS = [

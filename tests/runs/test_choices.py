@@ -10,7 +10,7 @@ import pytest
 from misbehaving import glide
 from test_study import Inline
 
-from macs.preferences import FuzzySatisfactory
+from macs.decisions import FuzzySatisfactory
 from runs import Study
 from runs.report.published import papers
 

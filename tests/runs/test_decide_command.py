@@ -59,8 +59,8 @@ def test_by_options(fronts: Path, here: Path, capsys: pytest.CaptureFixture[str]
     first, second = said.out.split("Turn 2: better horizontal speed: 0.7 km/s (converged, verified)")
     assert first.startswith("Turn 1: near flight time 150 s (converged, verified)") and re.search(r"flight time +min \[s\] +19\d", first)
     # The slope of the front, seen from either side.
-    rows = [line.split() for line in second.splitlines() if re.match(r"(flight time|horizontal speed) \[", line)]
-    assert float(rows[0][-1]) * float(rows[1][-1]) == pytest.approx(-1.0, rel=1e-2)
+    rows = [line.split() for line in second.splitlines() if re.match(r"(flight time|horizontal speed) +[-+]", line)]
+    assert float(rows[0][-1]) * float(rows[1][-2]) == pytest.approx(-1.0, rel=1e-2)
     # The dialogue goes on.
     assert main(["decide", "choice.json", "--improve", "flight time", "--giving", "horizontal speed=0.6", "--json", "choice.json"]) == 0
     again = Dialogue.load("choice.json")

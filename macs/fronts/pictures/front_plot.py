@@ -202,7 +202,7 @@ def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
     feasible or not verified may lie beyond the ends of the axes, which are those of the others, if there are two or more."""
     import matplotlib
 
-    F, values, (good, apart, infeasible) = front.F, front.objectives, kinds(front)
+    F, (good, apart, infeasible) = front.F, kinds(front)
     finite = np.where(np.isfinite(F) & (good | (good.sum() < 2))[:, None], F, np.nan)
     if len(front) and not np.isnan(finite).all():
         best, worst = np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)
@@ -219,17 +219,21 @@ def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
     for i, color in zip(marked, COLORS, strict=False):
         dashes = "--" if apart[i] else ":" if infeasible[i] else "-"
         ax.plot(height[i], color=color, lw=2.2, ls=dashes, zorder=4, label=_values(front, i))
-    signs = np.array([goal.sign for goal in front.goals])
-    for k in range(values.shape[1]):
+    parallel_axes(ax, front.goals, best, worst)
+
+
+def parallel_axes(ax: Any, goals: Sequence[Objective], best: np.ndarray, worst: np.ndarray) -> None:
+    """Draw the vertical axes of parallel coordinates, with the best and the worst value (m,) of each objective, all minimised."""
+    for k, goal in enumerate(goals):
         ax.plot([k, k], [0, 1], color="black", lw=0.8, zorder=0)
-        for level, value in ((1.015, best[k] * signs[k]), (-0.015, worst[k] * signs[k])):
+        for level, value in ((1.015, best[k] * goal.sign), (-0.015, worst[k] * goal.sign)):
             ax.text(k, level, axis_number(value), ha="center", va="bottom" if level > 0.5 else "top", fontsize=8)
     ax.grid(False)
-    ax.set_xlim(-0.3, len(front.goals) - 0.7)
+    ax.set_xlim(-0.3, len(goals) - 0.7)
     ax.set_ylim(-0.12, 1.12)
-    room = ax.bbox.width / ax.figure.dpi / len(front.goals)
-    names = [f"{wrapped(axis_label(goal.name, goal.unit), room, 8.0)}\n{goal.sense[:3]}" for goal in front.goals]
-    ax.set_xticks(range(len(front.goals)), names)
+    room = ax.bbox.width / ax.figure.dpi / len(goals)
+    names = [f"{wrapped(axis_label(goal.name, goal.unit), room, 8.0)}\n{goal.sense[:3]}" for goal in goals]
+    ax.set_xticks(range(len(goals)), names)
     ax.set_yticks([0, 1], ["worst", "best"])
     ax.tick_params(length=0)
     for side in ("left", "bottom"):

@@ -14,8 +14,7 @@ from matplotlib import image
 from synthetic_fronts import black_box, empty, flights, marked
 
 from macs import NSGA2
-from macs.decisions import Choice
-from macs.preferences import Ranges, WeightedSum
+from macs.decisions import Choice, Ranges, WeightedSum
 from problems.compiled import Objective, Variable
 from runs import Study
 

@@ -9,11 +9,11 @@ import pytest
 from fronts import distance_to_curve, inverted_distance
 
 from macs import MACS
+from macs.decisions import ReferencePoint
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import CONVERGED, Counts, Evaluation, Evaluator
 from macs.gradients.polish import BudgetedSolves, polish
 from macs.pareto.archive import Archive
-from macs.preferences import ReferencePoint
 from macs.search.guide import PreferenceGuide, Region
 from macs.search.settings import Variant
 from macs.search.state import SearchState
