@@ -27,12 +27,12 @@ CASES: dict[str, tuple[str, str]] = {
     "orbit_rise": ("problems.cases.orbit_rise:problem", "low-thrust orbit rise: time against energy, thrust angle in [0, pi]"),
     "orbit_rise_full": ("problems.cases.orbit_rise:problem_full", "the same, thrust angle in [-pi, pi] and periodic"),
     "landing_site": ("problems.cases.landing_site:problem", "landers on rough ground: effort against hazard, many local fronts"),
-    "reentry_case1": ("problems.cases.reentry.cases:case1", "shuttle re-entry: cross-range, heat load, oscillation, peak heating rate"),
-    "reentry_case2": ("problems.cases.reentry.cases:case2", "the same within narrow limits"),
-    "reentry_case3": ("problems.cases.reentry.cases:case3", "the same around three no-fly zones"),
-    "skip": ("problems.cases.skip_entry.skip:problem", "skip entry down to 51.88 km and up again: terminal mass against terminal speed"),
+    "reentry_case1": ("problems.cases.reentry:reentry_case1", "shuttle re-entry: cross-range, heat load, oscillation, peak heating rate"),
+    "reentry_case2": ("problems.cases.reentry:reentry_case2", "the same within narrow limits"),
+    "reentry_case3": ("problems.cases.reentry:reentry_case3", "the same around three no-fly zones"),
+    "skip": ("problems.cases.skip_entry:skip", "skip entry down to 51.88 km and up again: terminal mass against terminal speed"),
     "smv": (
-        "problems.cases.skip_entry.smv:problem",
+        "problems.cases.skip_entry:smv",
         "skip entry over a turning planet: flight time, heat load, terminal speed and mass",
     ),
     "aerocapture": (
@@ -47,8 +47,8 @@ CASES: dict[str, tuple[str, str]] = {
         "problems.cases.aerocapture.codesign:problem",
         "aerocapture at Mars, shape and bank profile together: inverse packing efficiency, heat shield and delta v",
     ),
-    "betts": ("problems.cases.reentry.cases:betts", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
-    "betts_heating": ("problems.cases.reentry.cases:betts_heating", "the same with a limit to the heating rate"),
+    "betts": ("problems.cases.reentry:betts", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
+    "betts_heating": ("problems.cases.reentry:betts_heating", "the same with a limit to the heating rate"),
     "welded_beam": ("problems.cases.structures:welded_beam", "without trajectories: cost against deflection of a welded beam"),
     "four_bar_truss": (
         "problems.cases.structures:four_bar_truss",
@@ -62,7 +62,10 @@ FORMER = {
     "problems.cases.four_bar_truss:problem": "four_bar_truss",
     "problems.cases.welded_beam:problem": "welded_beam",
     "problems.cases.aerocapture.codesign.case:problem": "aerocapture_codesign",
+    **{f"problems.cases.skip_entry.{case}:problem": case for case in ("skip", "smv")},
     **{f"problems.cases.reentry.case{i}:problem": f"reentry_case{i}" for i in (1, 2, 3)},
+    **{f"problems.cases.reentry.cases:case{i}": f"reentry_case{i}" for i in (1, 2, 3)},
+    **{f"problems.cases.reentry.cases:{case}": case for case in ("betts", "betts_heating")},
 }
 """Names of cases by addresses that they had, which saved fronts may carry."""
 FORMER_STANDARD = re.compile(r"problems\.cases\.standard\.\w+\.(\w+):problem")

@@ -7,7 +7,7 @@ the controls, and the time is free. Betts, "Practical Methods for Optimal Contro
 
 from macs import optimize
 from problems import load
-from problems.cases.reentry.cases import OPTIMA
+from problems.cases.reentry import OPTIMA
 
 best = optimize(load("betts"))
 print(best.alone().table())

@@ -6,7 +6,7 @@ Optimal Control and Estimation Using Nonlinear Programming", SIAM 2010, section 
 
 from macs import optimize
 from problems import load
-from problems.cases.reentry.cases import OPTIMA
+from problems.cases.reentry import OPTIMA
 
 best = optimize(load("betts_heating"))
 print(best.alone().table())

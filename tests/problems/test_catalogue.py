@@ -162,6 +162,8 @@ def test_a_function_of_a_file_is_called_only_if_it_is_defined_there_and_says_not
     [
         ("problems.cases.standard.curves.brachistochrone:problem", "standard/brachistochrone"),
         ("problems.cases.reentry.case2:problem", "reentry_case2"),
+        ("problems.cases.reentry.cases:case3", "reentry_case3"),
+        ("problems.cases.skip_entry.smv:problem", "smv"),
         ("problems.cases.aerocapture.codesign.case:problem", "aerocapture_codesign"),
         ("problems.cases.betts_heating:problem", "betts_heating"),
         ("problems.cases.welded_beam:problem", "welded_beam"),

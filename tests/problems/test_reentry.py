@@ -14,9 +14,8 @@ from statements import refused
 
 from macs import MACS, optimize
 from problems import load
-from problems.cases.reentry import cases, statement
-from problems.cases.reentry.cases import OPTIMA
-from problems.cases.reentry.statement import MASS, PRESSURE, SHUTTLE
+from problems.cases import reentry
+from problems.cases.reentry import MASS, OPTIMA, PRESSURE, SHUTTLE
 from runs.measures.references import closed_form, module_of
 from transcription import DFET, MultipleShooting, Trajectory
 
@@ -186,7 +185,7 @@ def test_the_guess_is_a_flight():
     np.testing.assert_allclose(states[:, -1] / span, end / span, atol=1e-4)
     for v, (low, high), value in zip(phase.states, phase.final, end, strict=True):
         assert low <= value <= high, v.name
-    assert statement.START.keys() == set(STATES)
+    assert reentry.START.keys() == set(STATES)
 
 
 @dataclass
@@ -263,7 +262,7 @@ SIGNS = [-1.0, 1.0, 1.0, 1.0]
 
 
 def front_of(case: str) -> np.ndarray:
-    with files("problems.cases.reentry").joinpath(f"{case}.csv").open() as file:
+    with files("problems.cases").joinpath(f"reentry_{case}.csv").open() as file:
         return np.loadtxt(file, delimiter=",", ndmin=2)
 
 
@@ -324,7 +323,7 @@ def test_rows_are_flights_within_the_limits(reference_flights):
     for k, (target, tolerance) in END.items():
         assert (np.abs(states[-1, k] - target) <= 1.02 * tolerance).all(), STATES[k]
     if case == "case3":
-        for zone in cases.ZONES:
+        for zone in reentry.ZONES:
             apart = np.hypot(np.degrees(states[:, 1]) - zone.longitude, np.degrees(states[:, 2]) - zone.latitude)
             assert (apart >= 0.99 * zone.radius).all()
             for east, north in np.degrees(states[:, 1:3]).transpose(2, 1, 0):

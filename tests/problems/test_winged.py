@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from problems.cases.reentry.statement import MASS, SHUTTLE
+from problems.cases.reentry import MASS, SHUTTLE
 from problems.cases.winged import STATES
 
 TURNING = replace(SHUTTLE, turning=7.2921151e-5)

@@ -30,9 +30,8 @@ from macs.io.console import Steps
 from macs.pareto.directions import across, simplex_lattice
 from macs.pareto.dominance import nondominated
 from problems import load
-from problems.cases.reentry import statement
-from problems.cases.reentry.cases import NARROW, WIDE, ZONES
-from problems.cases.reentry.statement import Limits
+from problems.cases import reentry
+from problems.cases.reentry import NARROW, WIDE, ZONES, Limits
 from problems.cases.winged import FOOT
 from transcription import DFET
 from transcription.nlp.scalarized import Solved
@@ -65,7 +64,7 @@ class Truth:
         limits, zones = CASES[case]
         self.limits = limits
         tolerances = {"altitude_tolerance": 3000 * FOOT, "speed_tolerance": 350 * FOOT, "angle_tolerance": np.radians(1.0)}
-        strict = statement.reentry(
+        strict = reentry.reentry(
             case,
             Limits(NARROWER * limits.heating_rate, NARROWER * limits.dynamic_pressure, NARROWER**2 * limits.load_factor),
             [replace(zone, radius=zone.radius / NARROWER**0.5) for zone in zones],
@@ -220,7 +219,7 @@ def made(case: str, points: int) -> np.ndarray:
 
 def table(case: str) -> np.ndarray:
     """The table of a case (k, 4 + n)."""
-    with files("problems.cases.reentry").joinpath(f"{case.removeprefix('reentry_')}.csv").open() as file:
+    with files("problems.cases").joinpath(f"{case}.csv").open() as file:
         return np.loadtxt(file, delimiter=",", ndmin=2)
 
 
@@ -256,9 +255,7 @@ def main() -> None:
     parser.add_argument("--out")
     given = parser.parse_args()
     rows = made(given.case, given.points)
-    write_whole(
-        given.out or Path(statement.__file__).parent / f"{given.case.removeprefix('reentry_')}.csv", text(given.case, rows).encode()
-    )
+    write_whole(given.out or Path(reentry.__file__).with_name(f"{given.case}.csv"), text(given.case, rows).encode())
     volume = moocore.hypervolume(np.ascontiguousarray(rows[:, :4] * SIGNS), ref=CORNER)
     print(f"{given.case}: {len(rows)} points, hypervolume {volume:.1f} in the paper's units, from the paper's corner")
     for k, row in enumerate(rows[[np.argmin(rows[:, k] * SIGNS[k]) for k in range(4)], :4]):

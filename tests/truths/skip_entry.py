@@ -13,7 +13,7 @@ from pathlib import Path
 from macs import Front, sweep
 from macs.io.atomic import write_whole
 from problems import load
-from problems.cases.skip_entry import skip
+from problems.cases import skip_entry
 
 CASES = ("skip", "smv")
 
@@ -37,7 +37,7 @@ def main() -> None:
         front = sweep(load(given.case), points=given.points)
     except ValueError as error:
         parser.error(str(error))
-    beside = Path(skip.__file__).with_name(f"{given.case}.csv")
+    beside = Path(skip_entry.__file__).with_name(f"{given.case}.csv")
     write_whole(given.out or beside, text(given.case, front).encode())
     print(front.table())
 

@@ -1,18 +1,17 @@
 """Capsules from their five variables to all that counts: packing, heat shield, lift and the way through the air, for many at once.
 
-And what Armellin and Lavagna print (see `mars`): the solutions of Table 2, the two shapes of Table 1, and the refined ones of Table 3.
+And what Armellin and Lavagna print (see `mars`): the solutions of Table 2.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from .capsule import Shapes, ballistic_coefficient, capsules, faults, lift_and_drag
 from .mars import shield_fraction
-from .passage import PASSAGE, Passage, Passages, outside, passages, tabulated
+from .passage import PASSAGE, Passage, outside, tabulated
 
 BOUNDS = ((0.1, 0.9), (0.2, 0.9), (20.0, 70.0), (5.0, 60.0), (-30.0, 30.0))
 """Of the five variables: radii of nose and back over that of the base, front angle, rear angle, angle of attack; deg."""
@@ -52,11 +51,8 @@ def shapes_of(X: np.ndarray) -> tuple[Shapes, np.ndarray]:
     return capsules(nose, rear, front, back), attack
 
 
-def assess(X: np.ndarray, passage: Passage = PASSAGE, way: Callable[[np.ndarray, Passage], Passages] = tabulated) -> JudgedCapsules:
-    """All about rows of the five variables (n, 5), see `BOUNDS`. No row raises an error: those that cannot be judged have a reason.
-
-    `way` has the passages of ballistic coefficients: `tabulated`, or `passages`, the solver itself.
-    """
+def assess(X: np.ndarray, passage: Passage = PASSAGE) -> JudgedCapsules:
+    """All about rows of the five variables (n, 5), see `BOUNDS`. No row raises an error: those that cannot be judged have a reason."""
     X = np.atleast_2d(np.asarray(X, float))
     reason = faults(X[:, 0], X[:, 1], *np.radians(X[:, 2:].T))
     columns = {f.name: np.full(len(X), np.nan) for f in fields(JudgedCapsules) if f.name != "reason"}
@@ -68,7 +64,7 @@ def assess(X: np.ndarray, passage: Passage = PASSAGE, way: Callable[[np.ndarray,
         reason[rows] = outside(ballistic)
         inside = reason[rows] == ""
         rows = rows[inside]
-        through = way(ballistic[inside], passage)
+        through = tabulated(ballistic[inside], passage)
         ratio, nose = (lift / drag)[inside], shapes.nose[inside]
         with np.errstate(divide="ignore"):
             cosine = np.clip(through.lift / ratio, -1.0, 1.0)
@@ -122,46 +118,3 @@ TABLE_2 = {
     5: Printed(6.1, 0.89, -19.27, 115.0, 0.30, 45.02, 52.3, -7.73, 2.19, 1.94, 0.82, 70.0, 5.2),
 }
 """By the number of the solution. The rear angle of the fourth is printed as 42.07 deg, with which its volume is 6.3 m3: here 32.44."""
-TABLE_1 = {1: (9.48, 0.15, 163.18, 135.99, 43.01, -8.57), 2: (7.44, 0.31, 115.7, 69.62, 48.6, -8.11)}
-"""Heat shield in %, lift over drag, bank angle in deg, ballistic coefficient, least altitude in km and entry angle in deg of two shapes
-whose measures are not printed."""
-TABLE_3 = {2: (40.85, -9.16, 7.98, 39.22), 3: (44.8, -9.38, 7.05, 38.25)}
-"""Least altitude in km, entry angle in deg, heat shield in % and delta v in m/s of solutions 2 and 3 after their refinement."""
-
-
-def table_2() -> str:
-    """Table 2 beside ours: for each solution the printed figures, then what follows here from its five variables."""
-    found = assess(np.array([solution.design for solution in TABLE_2.values()]), way=passages)
-    bank, entry = np.degrees(found.bank), np.degrees(found.entry_angle)
-    ours = (found.shield, found.packing, found.lift_to_drag, bank, found.ballistic, found.lowest / 1e3, entry, found.base)
-    heads = ("solution", "by", "TPS %", "eta 1/m2", "L/D", "bank deg", "BC kg/m2", "h_min km", "gamma_e deg", "r_b m")
-    rows: list[tuple[str, ...]] = []
-    for (number, p), here in zip(TABLE_2.items(), np.transpose(ours), strict=True):
-        theirs = (p.shield, p.packing, p.lift_to_drag, p.bank, p.ballistic, p.lowest, p.entry_angle, p.base)
-        rows += [(str(number), "the paper", *_figures(theirs)), ("", "ours", *_figures(here))]
-    return _aligned([heads, *rows])
-
-
-def table_1() -> str:
-    """Table 1 beside ours: what the ballistic coefficient decides; the nose radii, and with them the heat shields, are not printed."""
-    ours = passages(np.array([one[3] for one in TABLE_1.values()]))
-    heads = ("shape", "by", "BC kg/m2", "L/D", "bank deg", "h_min km", "gamma_e deg")
-    rows: list[tuple[str, ...]] = []
-    for row, (number, (_, ratio, bank, ballistic, lowest, entry)) in enumerate(TABLE_1.items()):
-        # The ratio is printed with two digits, and its sign follows from the bank angle beyond 90 deg.
-        angle = np.degrees(np.arccos(ours.lift[row] / ratio))
-        rows += [
-            (str(number), "the paper", *_figures((ballistic, ratio, bank, lowest, entry))),
-            ("", "ours", *_figures((ballistic, ratio, angle, ours.lowest[row] / 1e3, np.degrees(ours.entry_angle[row])))),
-        ]
-    return _aligned([heads, *rows])
-
-
-def _figures(values: Iterable[float]) -> list[str]:
-    return [f"{value:.2f}" for value in values]
-
-
-def _aligned(rows: list[tuple[str, ...]]) -> str:
-    """Rows of cells as text, in columns."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)

@@ -99,20 +99,6 @@ def exit_speed(delta_v: float, mars: Mars = MARS) -> float:
     return float(np.hypot(most - delta_v, vertical))
 
 
-def capture_by_burn(arrival_speed: float = ARRIVAL_SPEED, mars: Mars = MARS) -> float:
-    """Delta v, m/s, of a burn at the periapsis of the hyperbola, on the target orbit, that ends on it: what aerocapture spares.
-
-    Eq. (23) with 2 mu / r_a in its first root: with the printed mu / r_a the propellant is not the printed 0.594 of the mass.
-    """
-    circular = mars.mu / mars.target_radius
-    return float(np.sqrt(2.0 * circular + arrival_speed**2) - np.sqrt(circular))
-
-
-def propellant_fraction(delta_v: float, impulse: float = 400.0, gravity: float = 9.81) -> float:
-    """Propellant over initial mass for a delta v in m/s and a specific impulse in s: eq. (24)."""
-    return float(-np.expm1(-delta_v / (impulse * gravity)))
-
-
 def arrival(begins: Mapping[str, Any], declination: float, mars: Mars) -> dict[str, Any]:
     """What vanishes if the capsule comes from the right direction: components of its velocity far away across that, by name.
 

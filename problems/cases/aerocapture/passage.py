@@ -279,32 +279,17 @@ def _integrals(degree: int) -> np.ndarray:
 
 def _rates(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rates of the states along the arc from the exit back to the entry, their derivatives by the states, and by the lift."""
-    k = passage.stretch
-    rates, air, upward, pull, sine, cosine = _rates_and_parts(Y, lift[:, None, None], eps[:, None, None], passage)
-    jacobian, by_lift = np.zeros((*Y.shape, 3)), np.zeros(Y.shape)
+    k, air = passage.stretch, eps[:, None, None] * np.exp(Y[..., 0])
+    pull, sine, cosine = passage.pull * np.exp(Y[..., 1]), np.sin(Y[..., 2]), np.cos(Y[..., 2])
+    upward = 0.5 * lift[:, None, None] * air
+    rates, jacobian, by_lift = np.empty(Y.shape), np.zeros((*Y.shape, 3)), np.zeros(Y.shape)
+    rates[..., 0], rates[..., 1] = k * sine, -air - 2.0 / k * pull * sine
+    rates[..., 2] = -upward - (1.0 - pull) / k * cosine
     jacobian[..., 0, 2] = k * cosine
     jacobian[..., 1, 0], jacobian[..., 1, 1], jacobian[..., 1, 2] = -air, -2.0 / k * pull * sine, -2.0 / k * pull * cosine
     jacobian[..., 2, 0], jacobian[..., 2, 1], jacobian[..., 2, 2] = -upward, pull / k * cosine, (1.0 - pull) / k * sine
     by_lift[..., 2] = -0.5 * air
     return rates, jacobian, by_lift
-
-
-def slopes(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> np.ndarray:
-    """Rates of states (n, 3) of z, x and g along the arc from the exit back to the entry, for lifts and `Passage.drag` (n,)."""
-    return _rates_and_parts(Y, lift, eps, passage)[0]
-
-
-def _rates_and_parts(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarray, ...]:
-    """Rates of states (..., 3), and what they are made of (...): drag, lift upward, pull, sine and cosine of the path angle."""
-    k = passage.stretch
-    air = eps * np.exp(Y[..., 0])
-    pull, sine, cosine = passage.pull * np.exp(Y[..., 1]), np.sin(Y[..., 2]), np.cos(Y[..., 2])
-    upward = 0.5 * lift * air
-    rates = np.empty(Y.shape)
-    rates[..., 0] = k * sine
-    rates[..., 1] = -air - 2.0 / k * pull * sine
-    rates[..., 2] = -upward - (1.0 - pull) / k * cosine
-    return rates, air, upward, pull, sine, cosine
 
 
 def _measured(bc: np.ndarray, lift: np.ndarray, arc: np.ndarray, Y: np.ndarray, passage: Passage) -> Passages:

@@ -14,11 +14,15 @@ from scipy.optimize import brentq
 from macs import optimize, sweep
 from problems import load
 from problems.cases.aerocapture.capsule import MASS, lift_and_drag
-from problems.cases.aerocapture.designs import TABLE_2, TABLE_3, assess, shapes_of
+from problems.cases.aerocapture.designs import TABLE_2, assess, shapes_of
 from transcription import stated
 
 ASKED = {2: (37.0, 8.99), 3: (37.2, 7.88)}
 """Delta v in m/s and heat shield in % that the refined solutions are to keep; the shields are those of the coupled ones, rounded."""
+
+
+TABLE_3 = {2: (7.98, 39.22), 3: (7.05, 38.25)}
+"""Heat shield in % and delta v in m/s of these solutions after their refinement, as printed."""
 
 
 def capsule(shape: int) -> tuple[float, float, float]:
@@ -131,7 +135,7 @@ def test_table_3_is_beside_the_front(shape, above, heavier):
     """With the printed heat shield the least delta v is `above` the printed one; at the printed delta v the shield is less than `heavier`
     times the printed one. The bang-bang laws above, by other code, do no better, so it is the constants of heating that differ, which are
     fitted to passages at constant bank, and not the optimum."""
-    _, _, shield, delta_v = TABLE_3[shape]
+    shield, delta_v = TABLE_3[shape]
     _, point = optimum(shape, shield=shield)
     assert point.verified
     assert point.objectives["delta v"] == pytest.approx(delta_v + above, abs=0.1)

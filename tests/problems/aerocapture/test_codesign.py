@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
-
 import casadi as ca
 import flown_again
 import numpy as np
 import pytest
-from flown_again import CIRCULAR, DENSITY, HEIGHT, MASS, MU, TARGET, TOP
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from flown_again import CIRCULAR, MASS, MU, TARGET, TOP
+from truths.corridor import width
 from truths.two_steps import one_step, two_steps
 
 from macs import MACS, optimize
 from problems import load
 from problems.cases.aerocapture.capsule import lift_and_drag, sized
-from problems.cases.aerocapture.codesign import BALLISTIC, RATIO, boundary, corridor_width
+from problems.cases.aerocapture.codesign import BALLISTIC, RATIO, corridor_width
 from problems.cases.aerocapture.designs import BOUNDS, TABLE_2, assess, shapes_of
-from problems.cases.aerocapture.passage import passages
 from transcription import stated
 
 
@@ -50,58 +46,16 @@ def test_expressions_have_the_values_of_arrays_and_true_derivatives():
         assert np.isfinite(np.array(curves(row))).all()
 
 
-def exit_apoapsis(entry_angle: float, ballistic: float, lift: float) -> float:
-    """Altitude of the apoapsis over the target, m, of a planar passage with constant lift in the simplified equations of `passage`, flown
-    from the entry, over time; far above if it escapes, far below if it does not leave the air. Constants as printed there."""
-    weight = MU / TOP**2
-
-    def slope(_, y):
-        h, v, g = y.tolist()
-        drag = 0.5 * DENSITY * math.exp(-h / HEIGHT) * v**2 / ballistic
-        turn = lift * drag / v + (v / TOP - weight / v) * math.cos(g)
-        return [v * math.sin(g), -drag - weight * math.sin(g), turn]
-
-    def out(_, y):
-        return y[0]
-
-    def crash(_, y):
-        return y[0] + 100e3
-
-    out.terminal, out.direction, crash.terminal = True, 1, True
-    begin = [0.0, np.sqrt(25e6 + 2 * MU / TOP), entry_angle]
-    flown = solve_ivp(slope, (0, 1e4), begin, method="DOP853", rtol=1e-10, atol=[1e-4, 1e-7, 1e-12], events=[out, crash])
-    if not len(flown.t_events[0]):
-        return -1e6
-    _, v, g = flown.y[:, -1]
-    energy, momentum = v**2 / 2 - MU / TOP, TOP * v * np.cos(g)
-    if energy >= 0:
-        return 1e6
-    return -MU / (2 * energy) * (1 + np.sqrt(max(1 + 2 * energy * momentum**2 / MU**2, 0.0))) - TARGET
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("ballistic", "lift"), [(45.0, 0.32), (600.0, 0.72)])
-def test_corridors_against_flights_from_the_entry(ballistic, lift):
-    def edge(u: float) -> float:
-        return brentq(exit_apoapsis, np.radians(-40.0), np.radians(-4.0), args=(ballistic, u), xtol=1e-10)
-
-    steepest, shallowest = edge(lift), edge(-lift)
-    np.testing.assert_allclose(boundary(np.full(2, ballistic), np.array([lift, -lift])), [steepest, shallowest], atol=5e-6)
-    assert corridor_width(ballistic, lift) == pytest.approx(np.degrees(shallowest - steepest), abs=2e-3)
-    assert float(ca.evalf(corridor_width(ca.MX(ballistic), lift))) == pytest.approx(corridor_width(ballistic, lift), rel=1e-12)
-
-
-def test_the_passage_is_the_boundary_for_its_own_lift():
-    solved = passages(np.array([50.0, 120.0, 400.0]))
-    np.testing.assert_allclose(boundary(solved.ballistic, solved.lift), solved.entry_angle, atol=1e-7)
-
-
-@pytest.mark.slow
-def test_corridors_all_over_the_range():
+def test_corridors_against_flights_from_the_entry():
     rng = np.random.default_rng(8)
-    ballistic, lift = np.exp(rng.uniform(*np.log(BALLISTIC), 40)), rng.uniform(*RATIO, 40)
-    angles = np.degrees(boundary(np.tile(ballistic, 2), np.concatenate([-lift, lift])))
-    np.testing.assert_allclose(corridor_width(ballistic, lift), angles[:40] - angles[40:], atol=2e-3)
+    for ballistic, ratio in [
+        (45.0, 0.32),
+        (600.0, 0.72),
+        *zip(np.exp(rng.uniform(*np.log(BALLISTIC), 6)), rng.uniform(0.3, 0.8, 6), strict=True),
+    ]:
+        assert corridor_width(ballistic, ratio) == pytest.approx(width(ballistic, ratio), abs=2e-3)
+        assert float(ca.evalf(corridor_width(ca.MX(ballistic), ratio))) == pytest.approx(corridor_width(ballistic, ratio), rel=1e-12)
 
 
 def test_capsules_are_within_the_range_of_the_corridor():
@@ -171,8 +125,7 @@ def test_the_corridor_is_a_fourth_objective():
     assert point.verified
     found = assess(np.array([[point.parameters[name] for name in NAMES]]))
     ballistic, ratio = float(found.ballistic[0]), float(found.lift_to_drag[0])
-    angles = np.degrees(boundary(np.full(2, ballistic), np.array([-ratio, ratio])))
-    assert point.objectives["entry corridor"] == pytest.approx(angles[0] - angles[1], abs=2e-3)
+    assert point.objectives["entry corridor"] == pytest.approx(width(ballistic, ratio), abs=2e-3)
     assert point.objectives["entry corridor"] > 4.1, "that of solution 2 is 4.3"
 
 

@@ -1,34 +1,42 @@
-"""The re-entry of a shuttle with four objectives, stated for whatever limits and no-fly zones a case has.
+"""The re-entry of a shuttle: three cases with four objectives, and two with the greatest cross-range alone.
 
-Chai, Savvaris, Tsourdos, Xia and Chai, "Solving multiobjective constrained trajectory optimization problem by an extended evolutionary
-algorithm", IEEE Transactions on Cybernetics 50(4), 2020, eqs. (5)-(11). Where it leaves something open, it is chosen here: the angles at
-the beginning, the gains of the lag equations, the bounds of the states (no flight of interest leaves them). The final latitude is called
-longitude once, which is a slip; the heat load is in kBtu/ft2, the only unit in which it has the values of the paper's tables; and the
-integral of the rate of the flight-path angle, which would be a mere difference between its ends, is that of its absolute value.
+Four objectives: Chai, Savvaris, Tsourdos, Xia and Chai, "Solving multiobjective constrained trajectory optimization problem by an extended
+evolutionary algorithm", IEEE Transactions on Cybernetics 50(4), 2020, eqs. (5)-(11). Where it leaves something open, it is chosen here: the
+angles at the beginning, the gains of the lag equations, the bounds of the states (no flight of interest leaves them). The final latitude is
+called longitude once, which is a slip; the heat load is in kBtu/ft2, the only unit in which it has the values of the paper's tables; and
+the integral of the rate of the flight-path angle, which would be a mere difference between its ends, is that of its absolute value.
 
 The absolute value and the peak are exact in the search; gradient tools bound them from above, which is the same where they are minimised.
 
 The shuttle, with figures in feet, slugs and Btu (all that is computed is SI but for the heating rate): Betts, "Practical Methods for
 Optimal Control and Estimation Using Nonlinear Programming", SIAM 2010, section 6.1; eqs. (5) and (9) of the paper, in which the sign of
-the density's exponent is a slip.
+the density's exponent is a slip. His are the cases with one objective, whose optima are known to six digits: angle of attack and bank angle
+are the controls, the final time is free.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import degrees, pi, radians
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
 
-from ... import checks
-from ...compiled import vector_function
-from ...phase import Phase
-from ...problem import Problem
-from ..winged import FOOT, GRAVITIES, POUND, SLUG, UNITS, Winged
+from .. import checks
+from ..compiled import vector_function
+from ..phase import Phase
+from ..problem import Problem
+from .flight_figures import RED, ColouredFlights, track, trajectories
+from .winged import FOOT, GRAVITIES, POUND, SLUG, STATES, UNITS, Winged
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["betts", "betts_heating", "plot", "reentry_case1", "reentry_case2", "reentry_case3", "track"]
 
 MASS = 6309.43 * SLUG
 PRESSURE = POUND / FOOT**2
@@ -95,6 +103,21 @@ class Zone:
     longitude: float
     latitude: float
     radius: float
+
+
+WIDE = Limits(heating_rate=200.0, dynamic_pressure=280.0, load_factor=2.5)
+NARROW = Limits(heating_rate=150.0, dynamic_pressure=250.0, load_factor=1.25)
+ZONES = (Zone(30.0, 7.5, 5.0), Zone(60.0, 15.0, 5.0), Zone(70.0, 20.0, 5.0))
+OPTIMA = {"betts": (34.1412, 2008.59), "betts_heating": (30.6255, 2198.67)}
+"""Cross-range, deg, and final time, s, of the optima of Betts."""
+ALONG = (*STATES, *ANGLES, *(f"{angle} command" for angle in ANGLES))
+SHOWN_UNITS = {
+    "altitude": ("km", 1e-3),
+    "speed": ("km/s", 1e-3),
+    "heating rate": ("Btu/ft2/s", 1.0),
+    "dynamic pressure": ("lbf/ft2", 1.0),
+    "load factor": ("g", 1.0),
+}
 
 
 def reentry(
@@ -244,3 +267,85 @@ def known(case: str) -> np.ndarray:
     The further columns of the table are the commands that were simulated, from which each row can be checked.
     """
     return np.loadtxt(Path(__file__).with_name(f"{case}.csv"), delimiter=",", usecols=range(4), ndmin=2)
+
+
+reentry_case1_reference, reentry_case2_reference, reentry_case3_reference = (partial(known, f"reentry_case{i}") for i in (1, 2, 3))
+reentry_case1_reference_name = reentry_case2_reference_name = reentry_case3_reference_name = "the front that gradients found"
+"""Name of the reference in reports: every row is a local solve within narrower limits, so that there may be better flights."""
+
+
+def reentry_case1(**data: Any) -> Problem:
+    """Within wide limits; for `data` see `reentry`."""
+    return reentry("reentry_case1", WIDE, **data)
+
+
+def reentry_case2(**data: Any) -> Problem:
+    """Within narrow limits; for `data` see `reentry`."""
+    return reentry("reentry_case2", NARROW, **data)
+
+
+def reentry_case3(**data: Any) -> Problem:
+    """Within wide limits, around three no-fly zones; for `data` see `reentry`.
+
+    Every feasible flight passes south of all three, as far as gradients can tell: for one that passes north of the first, this zone would
+    have to lie 6.3 degrees farther south; of the second, south of the first, 1.5 degrees; of the third, south of both others, 8.0 degrees.
+    """
+    return reentry("reentry_case3", WIDE, ZONES, **data)
+
+
+def betts() -> Problem:
+    """The greatest cross-range, whatever the heat."""
+    return _greatest_cross_range("betts")
+
+
+def betts_heating() -> Problem:
+    """The greatest cross-range with a heating rate of at most 70 Btu/ft2/s."""
+    return _greatest_cross_range("betts_heating", 70.0)
+
+
+def betts_reference() -> np.ndarray:
+    """The optimal cross-range in degrees, shape (1, 1)."""
+    return np.array([[OPTIMA["betts"][0]]])
+
+
+def betts_heating_reference() -> np.ndarray:
+    """The same below the heating rate."""
+    return np.array([[OPTIMA["betts_heating"][0]]])
+
+
+def _greatest_cross_range(name: str, heating_rate: float | None = None) -> Problem:
+    """State it, with a limit to the heating rate, Btu/ft2/s, or none."""
+    problem = Problem(name)
+    phase = problem.phase("entry", t0=0.0, tf=(500.0, 4000.0))
+    states = declare(phase, {state: START[state] for state in STATES}, END)
+    attack, bank = (
+        phase.control(angle, bounds=bounds, unit="rad")
+        for angle, bounds in zip(ANGLES, ((-radians(90.0), radians(90.0)), (-radians(89.0), radians(1.0))), strict=True)
+    )
+    phase.dynamics(**SHUTTLE.rates(states, attack, bank, MASS))
+    if heating_rate is not None:
+        heating = SHUTTLE.heating_rate(states["altitude"], states["speed"], attack)
+        phase.path("heating rate", heating, upper=heating_rate, unit="Btu/ft2/s", scale=heating_rate)
+    problem.maximize("cross-range", degrees(1.0) * phase.final(states["latitude"]), unit="deg")
+    guess(phase, START, 2000.0, dict(zip(ANGLES, (ATTACK, BANK), strict=True)))
+    phase.guess(tf=2000.0)
+    problem.default_transcription = "dfet:20x3"
+    problem.default_evaluations = 1_000
+    return problem
+
+
+def plot(flights: Sequence[Any], zones: Sequence[Zone] = ()) -> dict[str, Figure]:
+    """States, angles and what the air does over time, and the ground track; the flights coloured by their cross-range."""
+    phases = [[trajectory["entry"]] for trajectory in trajectories(flights)]
+    flown = ColouredFlights(phases, np.array([degrees(flight[0]["latitude"][-1]) for flight in phases]), "cross-range [deg]")
+    figure, ax = flown.on_the_map()
+    around = np.linspace(0.0, 2 * np.pi, 181)
+    for zone in zones:
+        east, north = zone.longitude + zone.radius * np.cos(around), zone.latitude + zone.radius * np.sin(around)
+        ax.fill(east, north, facecolor="#f3c9b3", edgecolor=RED, lw=0.9, zorder=1)
+    # The cases of Betts have no commands.
+    along = [name for name in ALONG if name in phases[0][0].names]
+    return {"population": flown.over_time(along, SHOWN_UNITS), "ground-track": figure}
+
+
+reentry_case3_plot = partial(plot, zones=ZONES)
