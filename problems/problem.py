@@ -13,7 +13,7 @@ import casadi as ca
 from . import checks
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable, in_time, vector_function
 from .phase import Phase
-from .sampling import check_links, check_numbers, with_sizes
+from .sampling import check_links, samples, with_sizes
 
 DEFAULT_EVALUATIONS = 2_000
 """Default number of evaluations of a case of the catalogue that does not set its own."""
@@ -202,7 +202,7 @@ class Problem:
             data=dict(self.data),
         )
         labels = [phase._labels() for phase in phases]
-        check_numbers(compiled, labels)
+        samples(compiled, labels)
         check_links(compiled, labels)
         return with_sizes(compiled)
 

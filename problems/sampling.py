@@ -17,24 +17,26 @@ import numpy as np
 
 from .compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered
 
-SAMPLE_COUNTS = (64, 2048)
-"""Of samples: as many as do where each expression is a number at one of them, and the most."""
-FEW, MOST = SAMPLE_COUNTS
+FEW, MOST = 64, 2048
+"""Samples: as many as do where each expression is a number at one of them, and the most."""
 NEGLIGIBLE = 1e-9
 """Part of the largest value, or slope, up to which a difference is rounding."""
 Labels = Mapping[str, Sequence[str]]
 
 
-def check_numbers(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
-    """Raise a ValueError that names an expression which is not a finite number wherever we look within the bounds."""
-    _sampled(problem, labels)
+def samples(problem: CompiledProblem, labels: Sequence[Labels] | None = None) -> list[np.ndarray]:
+    """Samples of the arguments of objectives and constraints: columns of quantities of each phase and of parameters, (size, FEW) each.
 
-
-def samples(problem: CompiledProblem) -> list[np.ndarray]:
-    """Samples of the arguments of objectives and constraints: columns of quantities of each phase and of parameters, (size, FEW) each."""
-    names = ("dynamics", "path", "initials", "finals", "integrands", "peaks")
-    labels = [{name: [name] * getattr(phase, name).size1_out(0) for name in names} for phase in problem.phases]
-    return [values[:, :FEW] for values in _sampled(problem, labels)]
+    Raises a ValueError that names an expression, by the labels of its phase's Functions, which is not a finite number wherever we look
+    within the bounds.
+    """
+    if labels is None:
+        names = ("dynamics", "path", "initials", "finals", "integrands", "peaks")
+        labels = [{name: [name] * getattr(phase, name).size1_out(0) for name in names} for phase in problem.phases]
+    p, draws = _drawn(problem)
+    with suppress(ValueError):
+        return _checked(problem, labels, p, draws, FEW)
+    return [values[:, :FEW] for values in _checked(problem, labels, p, draws, MOST)]
 
 
 @remembered
@@ -46,18 +48,8 @@ def objective_spreads(problem: CompiledProblem) -> np.ndarray:
     return np.where(spread > 0.0, spread, 1.0)
 
 
-def _sampled(problem: CompiledProblem, labels: Sequence[Labels]) -> list[np.ndarray]:
-    """The same, (size, FEW) each, or (size, MOST) where few are not enough to find numbers. Raises as `check_numbers` does."""
-    with suppress(ValueError):
-        return _checked(problem, labels, FEW)
-    return _checked(problem, labels, MOST)
-
-
-def _checked(problem: CompiledProblem, labels: Sequence[Labels], count: int) -> list[np.ndarray]:
+def _checked(problem: CompiledProblem, labels: Sequence[Labels], p: np.ndarray, draws: Sequence[_Draw], count: int) -> list[np.ndarray]:
     """The first `count` samples. Raises ValueError if an expression is a number at none of them."""
-    rng = np.random.default_rng(0)
-    p = _between(rng, problem.parameters)
-    draws = [_drawn(phase, rng) for phase in problem.phases]
     found = _all_quantities(problem, labels, p, draws, count)
     place = f"of problem '{problem.name}'"
     _finite(problem.objectives, found, [f"objective '{goal.name}' {place}" for goal in problem.goals])
@@ -77,9 +69,7 @@ def check_links(problem: CompiledProblem, labels: Sequence[Labels]) -> None:
     """Raise a ValueError that names a constraint which only links make impossible, such as a jump of a state that a link continues."""
     if not (problem.links and problem.limits):
         return
-    rng = np.random.default_rng(0)
-    p = _between(rng, problem.parameters)
-    draws = [_drawn(phase, rng) for phase in problem.phases]
+    p, draws = _drawn(problem)
     apart = draws.copy()
     for link in sorted(problem.links, key=lambda link: problem.order_in_time.index(link.first)):
         names = [[state.name for state in problem.phases[i].states] for i in (link.first, link.second)]
@@ -118,7 +108,14 @@ class _Draw:
     controls: np.ndarray
 
 
-def _drawn(phase: CompiledPhase, rng: np.random.Generator) -> _Draw:
+def _drawn(problem: CompiledProblem) -> tuple[np.ndarray, list[_Draw]]:
+    """Samples of the parameters, and of each phase, from the same seed."""
+    rng = np.random.default_rng(0)
+    p = _between(rng, problem.parameters)
+    return p, [_phase_drawn(phase, rng) for phase in problem.phases]
+
+
+def _phase_drawn(phase: CompiledPhase, rng: np.random.Generator) -> _Draw:
     t0, tf = _between(rng, [phase.t0]), _between(rng, [phase.tf])
     tf = np.where(tf > t0, tf, np.minimum(t0 + phase.duration[0], phase.tf.upper))
     share = rng.random(MOST)

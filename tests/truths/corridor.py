@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -20,42 +21,60 @@ from scipy.optimize import brentq
 from problems.cases.aerocapture import codesign
 from problems.cases.aerocapture.codesign import BALLISTIC, RATIO
 
-MU, TOP, TARGET, HEIGHT, DENSITY = 4.2828e13, 3490.7e3, 3590.7e3, 8.92e3, 3.17e-7
-"""As printed there."""
+MU, RADIUS, HEIGHT, DENSITY = 4.2828e13, 3390.7e3, 8.92e3, 3.17e-7
+TOP, TARGET = RADIUS + 100e3, RADIUS + 200e3
+ENTRY_SPEED = np.sqrt(25e6 + 2 * MU / TOP)
 
 
-def exit_apoapsis(entry_angle: float, ballistic: float, lift: float) -> float:
-    """Altitude of the apoapsis over the target, m, of a planar passage with constant lift; far above if it escapes, far below if it does
-    not leave the air."""
-    weight = MU / TOP**2
+def heating(rho: float, v: float, nose: float = 1.0) -> float:
+    return 1.35e-8 * math.sqrt(rho / nose) * v**3.04 * (1 - 1.395e6 / (v**2 / 2))
 
-    def slope(_, y):
-        h, v, g = y.tolist()
-        drag = 0.5 * DENSITY * math.exp(-h / HEIGHT) * v**2 / ballistic
-        turn = lift * drag / v + (v / TOP - weight / v) * math.cos(g)
-        return [v * math.sin(g), -drag - weight * math.sin(g), turn]
 
-    def out(_, y):
-        return y[0]
+def planar(
+    entry_angle: float, ballistic: float, upward: Callable[[float], float], density: float = DENSITY, floor: float = 5e3
+) -> tuple[np.ndarray | None, float]:
+    """A flight with gravity and curvature of the interface, by DOP853: where the air is left, altitude above the interface, speed, path
+    angle and heat load (4,), or None if it comes below a floor, m; and the least altitude, m. `upward` is the lift over drag that points
+    upward over time."""
 
-    def crash(_, y):
-        return y[0] + 150e3
+    def slope(t, y):
+        h, v, g, _ = y.tolist()
+        rho = density * math.exp(-h / HEIGHT)
+        turn = rho * v * upward(t) / (2 * ballistic) + (v / TOP - MU / TOP**2 / v) * math.cos(g)
+        return [v * math.sin(g), -rho * v**2 / (2 * ballistic) - MU / TOP**2 * math.sin(g), turn, heating(rho, v)]
 
-    out.terminal, out.direction, crash.terminal = True, 1, True
-    begin = [0.0, np.sqrt(25e6 + 2 * MU / TOP), entry_angle]
-    flown = solve_ivp(slope, (0, 1e4), begin, method="DOP853", rtol=1e-10, atol=[1e-4, 1e-7, 1e-12], events=[out, crash])
-    if not len(flown.t_events[0]):
-        return -1e6
-    _, v, g = flown.y[:, -1]
-    energy, momentum = v**2 / 2 - MU / TOP, TOP * v * np.cos(g)
-    if energy >= 0:
-        return 1e6
-    return -MU / (2 * energy) * (1 + np.sqrt(max(1 + 2 * energy * momentum**2 / MU**2, 0.0))) - TARGET
+    def out(t, y):
+        return y[0] if t > 20.0 else -1.0
+
+    def down(_, y):
+        return y[0] + 100e3 - floor
+
+    def level(_, y):
+        return y[2]
+
+    out.terminal = down.terminal = True
+    out.direction = level.direction = 1
+    begin, atol = [0.0, ENTRY_SPEED, entry_angle, 0.0], [1e-5, 1e-8, 1e-12, 1e-6]
+    found = solve_ivp(slope, (0, 1e4), begin, method="DOP853", rtol=1e-11, atol=atol, events=[out, down, level])
+    assert found.status == 1
+    return found.y[:, -1] if len(found.t_events[0]) else None, min((y[0] for y in found.y_events[2]), default=0.0) + 100e3
+
+
+def apoapsis(speed: float, path_angle: float) -> float:
+    """Radius of the apoapsis, m, of the orbit after an exit; infinite on a hyperbola."""
+    energy, momentum = speed**2 / 2 - MU / TOP, TOP * speed * np.cos(path_angle)
+    return -MU / (2 * energy) * (1 + np.sqrt(max(1 + 2 * energy * momentum**2 / MU**2, 0.0))) if energy < 0 else np.inf
+
+
+def above_target(entry_angle: float, ballistic: float, lift: float) -> float:
+    """How far the apoapsis is above the target, m, with constant lift; far above if it escapes, far below if it does not leave the air."""
+    end, _ = planar(entry_angle, ballistic, lambda _: lift, floor=-50e3)  # the paper's air goes on below the ground
+    return -1e6 if end is None else min(apoapsis(end[1], end[2]) - TARGET, 1e6)
 
 
 def edge(ballistic: float, lift: float) -> float:
     """Path angle at the entry, deg, from which constant lift over drag that points upward leads to the target orbit."""
-    return math.degrees(brentq(exit_apoapsis, math.radians(-40.0), math.radians(-4.0), args=(ballistic, lift), xtol=1e-10))
+    return math.degrees(brentq(above_target, math.radians(-40.0), math.radians(-4.0), args=(ballistic, lift), xtol=1e-10))
 
 
 def width(ballistic: float, ratio: float) -> float:

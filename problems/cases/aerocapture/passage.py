@@ -92,7 +92,7 @@ def passages(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
     with the paper's data; the nearer the exit is to level, the more lift heavy capsules would need to stay within the atmosphere, far more
     than they have.
     """
-    bc = np.atleast_1d(np.asarray(ballistic, float))
+    bc = _within(ballistic)
     return _measured(bc, *_solved(bc, passage), passage)
 
 
@@ -101,21 +101,25 @@ COLUMNS = tuple(f.name for f in fields(Passages) if f.name != "ballistic")
 
 
 def outside(ballistic: np.ndarray) -> np.ndarray:
-    """Why ballistic coefficients (n,) have no entry in the table: text, empty where they have one."""
+    """Why there are no passages of ballistic coefficients (n,): text, empty where there are."""
+    text = np.array([f"ballistic coefficient {one:g} kg/m2, outside {RANGE[0]:g} to {RANGE[1]:g}" for one in ballistic], object)
+    return np.where((ballistic >= RANGE[0]) & (ballistic <= RANGE[1]), "", text)
+
+
+def _within(ballistic: np.ndarray) -> np.ndarray:
+    """Ballistic coefficients (n,) as an array; raises ValueError if one is outside `RANGE`."""
     bc = np.atleast_1d(np.asarray(ballistic, float))
-    text = np.array([f"ballistic coefficient {one:g} kg/m2, outside the table ({RANGE[0]:g} to {RANGE[1]:g})" for one in bc], object)
-    return np.where((bc >= RANGE[0]) & (bc <= RANGE[1]), "", text)
+    if reasons := [reason for reason in outside(bc) if reason]:
+        raise ValueError(reasons[0])
+    return bc
 
 
 def tabulated(ballistic: np.ndarray, passage: Passage = PASSAGE) -> Passages:
     """The passages of ballistic coefficients (n,), kg/m2, from the table; it is made when it is first asked for.
 
-    Raises ValueError: one is outside the table.
+    Raises ValueError: one is outside `RANGE`.
     """
-    bc = np.atleast_1d(np.asarray(ballistic, float))
-    reasons = outside(bc)
-    if reasons.any():
-        raise ValueError(next(filter(None, reasons)))
+    bc = _within(ballistic)
     places = 2.0 * np.log(bc / RANGE[0]) / np.log(RANGE[1] / RANGE[0]) - 1.0
     values = lagrange_matrix(nodes("chebyshev", TABLE_DEGREE), np.clip(places, -1.0, 1.0)) @ _table(passage)
     found = dict(zip(COLUMNS, values.T, strict=True))
@@ -148,8 +152,7 @@ class PassageProfile:
 
 def profile(ballistic: float, passage: Passage = PASSAGE) -> PassageProfile:
     """The passage of one ballistic coefficient, kg/m2, in time. Raises what `passages` does."""
-    bc = np.atleast_1d(np.asarray(ballistic, float))
-    _, arc, Y = _solved(bc, passage)
+    _, arc, Y = _solved(_within(np.asarray(ballistic)), passage)
     mars = passage.mars
     states = Y[0]
     speed = passage.entry_speed * np.exp(-0.5 * states[..., 1])
@@ -178,19 +181,15 @@ def profile(ballistic: float, passage: Passage = PASSAGE) -> PassageProfile:
 
 def _solved(bc: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lift (n,), arc (n,) and states (n, intervals, degree + 1, 3), from the exit to the entry; raises what `passages` does."""
-    outside = ~((bc >= RANGE[0]) & (bc <= RANGE[1]))
-    if outside.any():
-        raise ValueError(f"ballistic coefficient {bc[outside][0]:g} kg/m2: passages are solved from {RANGE[0]:g} to {RANGE[1]:g}")
     eps = passage.drag(bc)
     lift, arc, Y = _guess(bc, eps, passage)
     active = np.arange(len(bc))
     for _ in range(STEPS):
         try:
-            step = _newton(Y[active], arc[active], lift[active], eps[active], passage)
+            Y[active], arc[active], lift[active], size = _newton(Y[active], arc[active], lift[active], eps[active], passage)
         except np.linalg.LinAlgError as error:
             raise RuntimeError(f"no passage found for a ballistic coefficient of {_named(bc[active])}: {error}") from error
-        Y[active], arc[active], lift[active] = step.Y, step.arc, step.lift
-        active = active[step.size > TOLERANCE]
+        active = active[size > TOLERANCE]
         if not len(active):
             return lift, arc, Y
     raise RuntimeError(f"no passage found for a ballistic coefficient of {_named(bc[active])} in {STEPS} Newton steps")
@@ -217,22 +216,13 @@ def _guess(bc: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarra
     return lift, arc, Y
 
 
-@dataclass(frozen=True)
-class _Step:
-    """Unknowns after a Newton step, and its size (n,): 1 is the largest that is taken whole."""
-
-    Y: np.ndarray
-    arc: np.ndarray
-    lift: np.ndarray
-    size: np.ndarray
-
-
 LARGEST = np.array([1.0, 0.5, 0.1]), 0.2, 0.05
 """Largest changes of a Newton step: of z, x and g, of the arc as a share of it, and of the lift."""
 
 
-def _newton(Y: np.ndarray, arc: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> _Step:
-    """One Newton step from states Y (n, intervals, degree + 1, 3), whose intervals begin where the ones before end."""
+def _newton(Y: np.ndarray, arc: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarray, ...]:
+    """One Newton step from states Y (n, intervals, degree + 1, 3), whose intervals begin where the ones before end: states, arc and lift
+    after it, and its size (n,), of which 1 is the largest that is taken whole."""
     n, m, q = len(Y), Y.shape[1], Y.shape[2] - 1
     sums = _integrals(passage.degree)
     rates, jacobian, by_lift = _rates(Y, lift, eps, passage)
@@ -267,7 +257,7 @@ def _newton(Y: np.ndarray, arc: np.ndarray, lift: np.ndarray, eps: np.ndarray, p
     Y = Y.copy()
     Y[:, :, 1:] += share[:, None, None, None] * step
     Y[:, 1:, 0] = Y[:, :-1, -1]
-    return _Step(Y, arc + share * d_arc, lift + share * d_lift, size)
+    return Y, arc + share * d_arc, lift + share * d_lift, size
 
 
 @cache

@@ -7,9 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from flown_again import CIRCULAR, DENSITY, HEIGHT, MU, TARGET, TOP, confirm, heating
+from flown_again import CIRCULAR, confirm
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from truths.corridor import DENSITY, ENTRY_SPEED, HEIGHT, MU, TARGET, TOP, apoapsis, heating
 
 from macs import optimize, sweep
 from problems import load
@@ -100,17 +101,15 @@ def switched(entry_angle: float, at: float, shape: int) -> tuple[float, float, f
         out.terminal, out.direction, crash.terminal = True, 1, True
         return solve_ivp(slope, (t0, t1), begin, method="DOP853", rtol=1e-8, atol=[1e-3, 1e-6, 1e-11, 1e-5], events=[out, crash])
 
-    first = leg([0.0, np.sqrt(25e6 + 2 * MU / TOP), entry_angle, 0.0], 1.0, 0.0, at)
+    first = leg([0.0, ENTRY_SPEED, entry_angle, 0.0], 1.0, 0.0, at)
     last = leg(first.y[:, -1], -1.0, at, 4000.0) if first.status == 0 else first
     if not len(last.t_events[0]):
         return -1e6, np.inf, np.inf
     _, v, g, heat = last.y[:, -1]
-    energy = v**2 / 2 - MU / TOP
-    if energy >= 0:
+    farthest = apoapsis(v, g)
+    if np.isinf(farthest):
         return 1e6, np.inf, np.inf
-    momentum = TOP * v * np.cos(g)
-    apoapsis = -MU / (2 * energy) * (1 + np.sqrt(max(1 + 2 * energy * momentum**2 / MU**2, 0.0)))
-    return apoapsis - TARGET, CIRCULAR - momentum / apoapsis, 0.091 * heat**0.51575
+    return farthest - TARGET, CIRCULAR - TOP * v * np.cos(g) / farthest, 0.091 * heat**0.51575
 
 
 @pytest.mark.slow

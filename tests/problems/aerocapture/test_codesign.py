@@ -6,8 +6,8 @@ import casadi as ca
 import flown_again
 import numpy as np
 import pytest
-from flown_again import CIRCULAR, MASS, MU, TARGET, TOP
-from truths.corridor import width
+from flown_again import CIRCULAR, MASS
+from truths.corridor import MU, TARGET, TOP, width
 from truths.two_steps import one_step, two_steps
 
 from macs import MACS, optimize

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from functools import cache
 
 import numpy as np
 import pytest
-from flown_again import DENSITY, HEIGHT, MU, RADIUS, TARGET, TOP, heating
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from truths.corridor import DENSITY, MU, RADIUS, TARGET, TOP, apoapsis, planar
 
 from macs import payoff
 from problems import load
@@ -33,49 +31,9 @@ def capsule(number: int) -> Capsule:
 
 
 def over_a_plain(design: Capsule, upward, case: Cases, row: int):
-    """How a case ends with gravity and curvature of the interface: altitude above it, speed, path angle and heat load."""
-    ballistic, surface = float(design.ballistic * case.ballistic[row]), float(DENSITY * case.density[row])
-
-    def slope(t, y):
-        h, v, g, _ = y.tolist()
-        rho = surface * math.exp(-h / HEIGHT)
-        turn = rho * v * upward(t) / (2 * ballistic) + (v / TOP - MU / TOP**2 / v) * math.cos(g)
-        return [v * math.sin(g), -rho * v**2 / (2 * ballistic) - MU / TOP**2 * math.sin(g), turn, heating(rho, v)]
-
-    begin = [0.0, design.entry_speed, design.entry_angle + case.entry_angle[row], 0.0]
-    return ended(slope, begin, lambda y: y[0], lambda y: y[2], [1e-5, 1e-8, 1e-12, 1e-6])
-
-
-def ended(slope, begin, height, climb, atol, max_step=np.inf):
-    """Integrated until the height above the interface is 0 again, or -95 km; with the least height, at the zeros of the climb."""
-
-    def out(t, y):
-        return height(y) if t > 20.0 else -1.0
-
-    def down(_, y):
-        return height(y) + 95e3
-
-    def level(_, y):
-        return climb(y)
-
-    out.terminal = down.terminal = True
-    out.direction = level.direction = 1
-    found = solve_ivp(slope, (0, 1e4), begin, method="DOP853", rtol=1e-11, atol=atol, events=[out, down, level], max_step=max_step)
-    assert found.status == 1
-    end = found.y[:, -1] if len(found.t_events[0]) else None
-    return end, min((height(y) for y in found.y_events[2]), default=0.0) + 100e3
-
-
-def momentum_and_energy(end: np.ndarray) -> tuple[float, float]:
-    return TOP * end[1] * np.cos(end[2]), end[1] ** 2 / 2 - MU / TOP
-
-
-def apoapsis(end: np.ndarray) -> float:
-    """Altitude of the apoapsis, km; infinite on a hyperbola."""
-    momentum, energy = momentum_and_energy(end)
-    if energy >= 0:
-        return np.inf
-    return (-MU / (2 * energy) * (1 + np.sqrt(max(1 + 2 * energy * momentum**2 / MU**2, 0.0))) - RADIUS) / 1e3
+    """How a case ends, see `planar`."""
+    angle, ballistic = design.entry_angle + case.entry_angle[row], float(design.ballistic * case.ballistic[row])
+    return planar(angle, ballistic, upward, float(DENSITY * case.density[row]))
 
 
 def upward_of(design: Capsule):
@@ -114,13 +72,11 @@ def test_cases_flown_by_other_code(design):
             assert not outcome.captured[row] and np.isnan(outcome.delta_v[row])
             met.add("lost")
             continue
-        momentum, energy = momentum_and_energy(end)
-        speed = np.sqrt(2 * (energy + MU / TOP))
-        assert exits.speed[row] == pytest.approx(speed, rel=RTOL)
-        assert exits.path_angle[row] == pytest.approx(np.arccos(min(momentum / (TOP * speed), 1.0)), abs=RTOL)
+        assert exits.speed[row] == pytest.approx(end[1], rel=RTOL)
+        assert exits.path_angle[row] == pytest.approx(end[2], abs=RTOL)
         assert exits.heat[row] == pytest.approx(end[-1], rel=RTOL)
         assert exits.lowest[row] == pytest.approx(least, rel=RTOL)
-        above = apoapsis(end)
+        above = (apoapsis(end[1], end[2]) - RADIUS) / 1e3
         assert outcome.captured[row] == (above <= 10_000)
         met.add("captured" if above <= 10_000 else "away")
         if outcome.captured[row]:
@@ -136,10 +92,10 @@ def test_the_farthest_apoapsis_that_counts():
 
     def above(upward: float) -> float:
         end, _ = over_a_plain(design, lambda _: upward, NOMINAL, 0)
-        return 1.0 / (apoapsis(end) + RADIUS / 1e3) if end is not None else 1.0
+        return 1.0 / apoapsis(end[1], end[2]) if end is not None else 1.0
 
     start = design.lift_to_drag * np.cos(design.bank)
-    limit = brentq(lambda u: above(u) - 1e3 / (RADIUS + 10_000e3), start, start + 0.06, xtol=1e-10)
+    limit = brentq(lambda u: above(u) - 1.0 / (RADIUS + 10_000e3), start, start + 0.06, xtol=1e-10)
     for upward, inside in ((limit - 1e-6, True), (limit + 1e-6, False), (limit + 0.05, False), (0.3, False)):
         flight = Capsule(design.ballistic, 1.0, design.nose, design.entry_angle, np.arccos(upward))
         found = with_same_bank(flight, NOMINAL)
@@ -179,7 +135,7 @@ def test_two_burns():
     assert two_burns(np.array([3500.0]), np.array([angle]))[0] == pytest.approx(circularisation(3500.0), rel=1e-12)
     speed, path = np.array([3480.0, 3600.0, 4500.0]), np.array([0.01, 0.05, 0.1])
     for v, g, found in zip(speed, path, two_burns(speed, path), strict=True):
-        r = 1e3 * apoapsis(np.array([0.0, v, g, 0.0])) + RADIUS
+        r = apoapsis(v, g)
         between = 2 * MU / (r + TARGET)
         at_apoapsis = abs(np.sqrt(2 * MU / r - between) - TOP * v * np.cos(g) / r)
         assert found == pytest.approx(at_apoapsis + abs(np.sqrt(2 * MU / TARGET - between) - np.sqrt(MU / TARGET)), rel=1e-9)
