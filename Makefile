@@ -40,7 +40,7 @@ mutants: $(READY)
 
 # By hand: random problems and black boxes, about an hour; a hundred kills at random times, some minutes. A minute of each is in `test-slow`.
 fuzz: $(READY)
-	$(BIN)/python tests/fuzz/run_fuzz.py --flights 2000 --boxes 1000
+	$(BIN)/python tests/fuzz/fuzzing.py --flights 2000 --boxes 1000
 
 kills: $(READY)
 	$(BIN)/python tests/runs/kills.py --kills 100

@@ -9,6 +9,7 @@ import hashlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
+from graphlib import TopologicalSorter
 from heapq import heappop, heappush
 from inspect import unwrap
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -184,19 +185,18 @@ class Link:
 
 
 def in_time(count: int, links: Sequence[Link]) -> list[int]:
-    """Indices of so many phases, each after those that lead into it; otherwise as declared. Links must not close a circle."""
-    after: list[list[int]] = [[] for _ in range(count)]
-    awaited = [0] * count
+    """Indices of so many phases, each after those that lead into it; otherwise as declared. Raises CycleError if links close a circle."""
+    sorter = TopologicalSorter[int](dict.fromkeys(range(count), ()))
     for link in links:
-        after[link.first].append(link.second)
-        awaited[link.second] += 1
-    ready, order = [i for i in range(count) if not awaited[i]], []
-    while ready:
+        sorter.add(link.second, link.first)
+    sorter.prepare()
+    ready: list[int] = []
+    order = []
+    while sorter.is_active():
+        for i in sorter.get_ready():
+            heappush(ready, i)
         order.append(heappop(ready))
-        for i in after[order[-1]]:
-            awaited[i] -= 1
-            if not awaited[i]:
-                heappush(ready, i)
+        sorter.done(order[-1])
     return order
 
 

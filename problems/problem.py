@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from graphlib import CycleError, TopologicalSorter
+from graphlib import CycleError
 from types import MappingProxyType
 from typing import Any
 
@@ -139,11 +139,8 @@ class Problem:
                 raise ValueError(f"{place}: '{name}' is not a state of both; they share {', '.join(common) or 'none'}")
         if pair in self._links:
             raise ValueError(f"{place} is given twice")
-        order: TopologicalSorter[int] = TopologicalSorter()
-        for before, after in (*self._links, pair):
-            order.add(after, before)
         try:
-            order.prepare()
+            in_time(len(self._phases), [Link(*joined, ()) for joined in (*self._links, pair)])
         except CycleError:
             raise ValueError(f"{place} would make time run in a circle; state a periodic condition with `constraint`") from None
         self._links[pair] = chosen

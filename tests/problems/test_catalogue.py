@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from statements import refused
 
 from problems import Problem, describe, is_catalogued, load, names
 from transcription import stated
@@ -45,15 +46,6 @@ def case(tmp_path):
     path = tmp_path / "my case.py"
     path.write_text(CASE)
     return path
-
-
-def refused(action, *words):
-    with pytest.raises(ValueError) as caught:
-        action()
-    message = str(caught.value)
-    assert "\n" not in message
-    for word in words:
-        assert word in message, message
 
 
 @pytest.mark.parametrize("name", [name for name in names() if isinstance(load(name), Problem)])

@@ -53,55 +53,38 @@ def test_differences_are_relative_or_in_scales():
 
 
 QUICK = {
-    "batch_reactor": "dfet:40x3:bernstein:1",
-    "brachistochrone": "dfet:20x3",
-    "breakwell": "dfet:20x3",
-    "bryson_denham": "dfet:20x3",
-    "bryson_max_range": "dfet:10x8",
-    "car": "dfet:40x3:bernstein:1",
-    "catalyst_mixing": "dfet:40x3:bernstein:1",
-    "crane": "dfet:20x3",
-    "fast_oscillator": "dfet:40x3:bernstein:1",
-    "hang_glider": "dfet:20x3:bernstein",
-    "hanging_chain": "dfet:10x6",
-    "isoperimetric": "dfet:3x8",
-    "jacobson": "dfet:40x3:bernstein:1",
-    "jacobson_lele": "dfet:20x3",
-    "linear_tangent": "dfet:8x3:bernstein",
-    "lotka_fishing": "dfet:40x3:bernstein:1",
-    "moon_landing": "dfet:40x3:bernstein:1",
-    "newton_nose": "dfet:8x3:bernstein",
-    "orbit_raising": "dfet:40x3:bernstein:1",
-    "rayleigh": "dfet:20x3",
-    "schwartz": "dfet:8x3:bernstein",
-    "sounding_rocket": "dfet:3x5:bernstein:3",
-    "stirred_tank": "dfet:20x3",
-    "tumour": "dfet:40x3:bernstein:1",
-    "two_link_arm": "dfet:40x3:bernstein:1",
-    "van_der_pol": "dfet:20x3",
-    "zermelo": "dfet:8x3:bernstein",
+    "dfet:10x6": "hanging_chain",
+    "dfet:10x8": "bryson_max_range",
+    "dfet:20x3": "brachistochrone breakwell bryson_denham crane jacobson_lele rayleigh stirred_tank van_der_pol",
+    "dfet:20x3:bernstein": "hang_glider",
+    "dfet:3x5:bernstein:3": "sounding_rocket",
+    "dfet:3x8": "isoperimetric",
+    "dfet:40x3:bernstein:1": "batch_reactor car catalyst_mixing fast_oscillator jacobson lotka_fishing moon_landing orbit_raising "
+    "tumour two_link_arm",
+    "dfet:8x3:bernstein": "linear_tangent newton_nose schwartz zermelo",
 }
+"""By mesh."""
 # Not here, since no uniform mesh of a sensible size finds them from one start: alp_rider, dubins, f8 (from its own guess),
 # free_flying_robot, low_thrust, obstacle and rocket; test_standard_truths.py has independent references of most.
 SLOW = {
-    "aly_chan": "dfet:8x3:bernstein",
-    "climb": "dfet:30x4",
-    "delta_iii": "dfet:5x4",
-    "dynamic_soaring": "dfet:20x3",
-    "hypersensitive": "dfet:60x5",
-    "missile": "dfet:20x3",
-    "plane_change": "dfet:30x4:bernstein",
-    "reorientation": "dfet:40x3:bernstein:1",
-    "tuberculosis": "dfet:20x3:bernstein",
-    "robot_arm": "dfet:40x3:bernstein:1",
+    "dfet:20x3": "dynamic_soaring missile",
+    "dfet:20x3:bernstein": "tuberculosis",
+    "dfet:30x4": "climb",
+    "dfet:30x4:bernstein": "plane_change",
+    "dfet:40x3:bernstein:1": "reorientation robot_arm",
+    "dfet:5x4": "delta_iii",
+    "dfet:60x5": "hypersensitive",
+    "dfet:8x3:bernstein": "aly_chan",
 }
 LIMIT = 5e-3
 """Largest violation when simulated: the usual basis may leave limits a little between its nodes."""
 
 
-@pytest.mark.parametrize(
-    ("name", "mesh"), [*QUICK.items(), *(pytest.param(*item, marks=pytest.mark.slow) for item in SLOW.items())], ids=label
-)
+def by_mesh(known, **marks):
+    return [pytest.param(name, mesh, **marks) for mesh, names in known.items() for name in names.split()]
+
+
+@pytest.mark.parametrize(("name", "mesh"), [*by_mesh(QUICK), *by_mesh(SLOW, marks=pytest.mark.slow)], ids=label)
 def test_the_published_optimum_is_found_and_flies(name, mesh):
     """On a mesh that is known to do, from one start: what the defaults find is the matter of `macs bench standard`. Other starts find what
     is better on the mesh alone, such as a soaring that leaves its limits between the nodes."""
