@@ -22,38 +22,36 @@ from .vector import VectorProblem
 
 STANDARD = "standard/"
 """What the names of the published problems begin with."""
-CASES: dict[str, tuple[str, str]] = {
-    "goddard": ("problems.cases.goddard:problem", "ascent from a flat airless body: time against horizontal speed"),
-    "orbit_rise": ("problems.cases.orbit_rise:problem", "low-thrust orbit rise: time against energy, thrust angle in [0, pi]"),
-    "orbit_rise_full": ("problems.cases.orbit_rise:problem_full", "the same, thrust angle in [-pi, pi] and periodic"),
-    "landing_site": ("problems.cases.landing_site:problem", "landers on rough ground: effort against hazard, many local fronts"),
-    "reentry_case1": ("problems.cases.reentry:reentry_case1", "shuttle re-entry: cross-range, heat load, oscillation, peak heating rate"),
-    "reentry_case2": ("problems.cases.reentry:reentry_case2", "the same within narrow limits"),
-    "reentry_case3": ("problems.cases.reentry:reentry_case3", "the same around three no-fly zones"),
-    "skip": ("problems.cases.skip_entry:skip", "skip entry down to 51.88 km and up again: terminal mass against terminal speed"),
-    "smv": (
-        "problems.cases.skip_entry:smv",
-        "skip entry over a turning planet: flight time, heat load, terminal speed and mass",
-    ),
+OWN = {
+    "goddard": ("goddard:problem", "ascent from a flat airless body: time against horizontal speed"),
+    "orbit_rise": ("orbit_rise:problem", "low-thrust orbit rise: time against energy, thrust angle in [0, pi]"),
+    "orbit_rise_full": ("orbit_rise:problem_full", "the same, thrust angle in [-pi, pi] and periodic"),
+    "landing_site": ("landing_site:problem", "landers on rough ground: effort against hazard, many local fronts"),
+    "reentry_case1": ("reentry:reentry_case1", "shuttle re-entry: cross-range, heat load, oscillation, peak heating rate"),
+    "reentry_case2": ("reentry:reentry_case2", "the same within narrow limits"),
+    "reentry_case3": ("reentry:reentry_case3", "the same around three no-fly zones"),
+    "skip": ("skip_entry:skip", "skip entry down to 51.88 km and up again: terminal mass against terminal speed"),
+    "smv": ("skip_entry:smv", "skip entry over a turning planet: flight time, heat load, terminal speed and mass"),
     "aerocapture": (
-        "problems.cases.aerocapture.coupled:problem",
+        "aerocapture.coupled:problem",
         "aerocapture at Mars, shapes of capsules at constant bank: inverse packing efficiency against heat shield",
     ),
     "aerocapture_bank": (
-        "problems.cases.aerocapture.bank:problem",
+        "aerocapture.bank:problem",
         "aerocapture at Mars by a bank profile, to a polar orbit: delta v against heat shield",
     ),
     "aerocapture_codesign": (
-        "problems.cases.aerocapture.codesign:problem",
+        "aerocapture.codesign:problem",
         "aerocapture at Mars, shape and bank profile together: inverse packing efficiency, heat shield and delta v",
     ),
-    "betts": ("problems.cases.reentry:betts", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
-    "betts_heating": ("problems.cases.reentry:betts_heating", "the same with a limit to the heating rate"),
-    "welded_beam": ("problems.cases.structures:welded_beam", "without trajectories: cost against deflection of a welded beam"),
-    "four_bar_truss": (
-        "problems.cases.structures:four_bar_truss",
-        "without trajectories: volume against displacement of a truss, front in closed form",
-    ),
+    "betts": ("reentry:betts", "shuttle re-entry of the greatest cross-range: one objective, its optimum known"),
+    "betts_heating": ("reentry:betts_heating", "the same with a limit to the heating rate"),
+    "welded_beam": ("structures:welded_beam", "without trajectories: cost against deflection of a welded beam"),
+    "four_bar_truss": ("structures:four_bar_truss", "without trajectories: volume against displacement of a truss, front in closed form"),
+}
+"""Module within `cases` and function of each case, and one line on it."""
+CASES: dict[str, tuple[str, str]] = {
+    **{name: (f"problems.cases.{address}", text) for name, (address, text) in OWN.items()},
     **{STANDARD + name: (address, f"published: {text}") for name, (address, text) in standard.cases().items()},
 }
 FORMER = {

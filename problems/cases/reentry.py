@@ -30,7 +30,7 @@ from .. import checks
 from ..compiled import vector_function
 from ..phase import Phase
 from ..problem import Problem
-from .flight_figures import RED, ColouredFlights, track, trajectories
+from .flight_figures import RED, pictures, track, trajectories
 from .winged import FOOT, GRAVITIES, POUND, SLUG, STATES, UNITS, Winged
 
 if TYPE_CHECKING:
@@ -303,14 +303,7 @@ def betts_heating() -> Problem:
     return _greatest_cross_range("betts_heating", 70.0)
 
 
-def betts_reference() -> np.ndarray:
-    """The optimal cross-range in degrees, shape (1, 1)."""
-    return np.array([[OPTIMA["betts"][0]]])
-
-
-def betts_heating_reference() -> np.ndarray:
-    """The same below the heating rate."""
-    return np.array([[OPTIMA["betts_heating"][0]]])
+betts_reference, betts_heating_reference = (partial(np.full, (1, 1), cross_range) for cross_range, _ in OPTIMA.values())
 
 
 def _greatest_cross_range(name: str, heating_rate: float | None = None) -> Problem:
@@ -337,15 +330,15 @@ def _greatest_cross_range(name: str, heating_rate: float | None = None) -> Probl
 def plot(flights: Sequence[Any], zones: Sequence[Zone] = ()) -> dict[str, Figure]:
     """States, angles and what the air does over time, and the ground track; the flights coloured by their cross-range."""
     phases = [[trajectory["entry"]] for trajectory in trajectories(flights)]
-    flown = ColouredFlights(phases, np.array([degrees(flight[0]["latitude"][-1]) for flight in phases]), "cross-range [deg]")
-    figure, ax = flown.on_the_map()
+    reached = np.array([degrees(flight[0]["latitude"][-1]) for flight in phases])
+    # The cases of Betts have no commands.
+    along = [name for name in ALONG if name in phases[0][0].names]
+    figures = pictures(phases, reached, "cross-range [deg]", along, SHOWN_UNITS)
     around = np.linspace(0.0, 2 * np.pi, 181)
     for zone in zones:
         east, north = zone.longitude + zone.radius * np.cos(around), zone.latitude + zone.radius * np.sin(around)
-        ax.fill(east, north, facecolor="#f3c9b3", edgecolor=RED, lw=0.9, zorder=1)
-    # The cases of Betts have no commands.
-    along = [name for name in ALONG if name in phases[0][0].names]
-    return {"population": flown.over_time(along, SHOWN_UNITS), "ground-track": figure}
+        figures["ground-track"].axes[0].fill(east, north, facecolor="#f3c9b3", edgecolor=RED, lw=0.9, zorder=1)
+    return figures
 
 
 reentry_case3_plot = partial(plot, zones=ZONES)

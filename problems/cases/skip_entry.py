@@ -39,7 +39,7 @@ import numpy as np
 from .. import checks
 from ..phase import Phase
 from ..problem import Problem
-from .flight_figures import ColouredFlights, track, trajectories
+from .flight_figures import pictures, track, trajectories
 from .reentry import SHUTTLE, guess
 from .winged import FOOT, SLUG, STATES, UNITS, Winged
 
@@ -160,8 +160,7 @@ def _fly(phase: Phase, mission: Mission, begins: Mapping[str, float], ends: Mapp
 def plot(flights: Sequence[Any]) -> dict[str, Figure]:
     """States, controls with their commands and what the air does over time, and the ground track; coloured by flight time."""
     phases = [list(trajectory.values()) for trajectory in trajectories(flights)]
-    flown = ColouredFlights(phases, np.array([flight[-1].tf for flight in phases]), "flight time [s]")
-    return {"population": flown.over_time(ALONG, SHOWN_UNITS), "ground-track": flown.on_the_map()[0]}
+    return pictures(phases, np.array([flight[-1].tf for flight in phases]), "flight time [s]", ALONG, SHOWN_UNITS)
 
 
 SKIP_VEHICLE = Winged(

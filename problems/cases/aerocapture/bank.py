@@ -20,7 +20,7 @@ import numpy as np
 
 from ... import checks
 from ...problem import Problem
-from ..flight_figures import ColouredFlights, track, trajectories
+from ..flight_figures import pictures, track, trajectories
 from ..winged import STATES, UNITS, Winged
 from .capsule import MASS, lift_and_drag
 from .designs import TABLE_2, JudgedCapsules, assess, shapes_of
@@ -239,5 +239,4 @@ def plot(flights: Sequence[Any]) -> dict[str, Figure]:
     """Both figures by name, states and bank over time, as figures 14 to 17 of the paper, and the ground track, coloured by delta v."""
     phases = [list(trajectory.values()) for trajectory in trajectories(flights)]
     speeds = np.array([float(flight[-1].at(flight[-1].tf)["speed"]) for flight in phases])
-    flown = ColouredFlights(phases, circularisation(speeds), "delta v [m/s]")
-    return {"population": flown.over_time(ALONG, SHOWN_UNITS), "ground-track": flown.on_the_map()[0]}
+    return pictures(phases, circularisation(speeds), "delta v [m/s]", ALONG, SHOWN_UNITS)
