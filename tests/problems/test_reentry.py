@@ -120,26 +120,6 @@ def test_the_objectives_have_the_units_of_the_paper():
     assert np.array(compiled.constraints(quantities, [])).ravel() == pytest.approx(errors)
 
 
-def integrated(rates, state: list[float], seconds: float) -> np.ndarray:
-    names = STATES[:6]
-
-    def right_hand_side(_: float, y: np.ndarray) -> list[float]:
-        found = rates(dict(zip(names, y, strict=True)))
-        return [float(found[name]) for name in names]
-
-    return solve_ivp(right_hand_side, (0, seconds), state, method="DOP853", rtol=1e-11, atol=1e-9).y[:, -1]
-
-
-def test_without_bank_the_flight_stays_in_its_vertical_plane():
-    """Along the equator; and anywhere on a great circle, by Clairaut's relation."""
-    along = integrated(lambda state: SHUTTLE.rates(state, 0.3, 0.0, MASS), [79e3, 0.0, 0.0, 7800.0, -0.017, math.pi / 2], 800.0)
-    assert abs(along[2]) < 1e-12 and along[5] == pytest.approx(math.pi / 2, abs=1e-12) and along[1] > 0.8
-    start = [79e3, 0.0, 0.2, 7800.0, -0.017, 1.0]
-    end = integrated(lambda state: SHUTTLE.rates(state, 0.3, 0.0, MASS), start, 800.0)
-    assert end[2] > 0.4
-    assert math.cos(end[2]) * math.sin(end[5]) == pytest.approx(math.cos(0.2) * math.sin(1.0), rel=1e-9)
-
-
 def test_data_change_the_flight():
     x, u = anywhere(np.random.default_rng(2))
     heavy = load("reentry_case1", mass=96683.0, lag_gain=0.2).compile().phases[0]

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from problems.cases.reentry import MASS, SHUTTLE
@@ -15,12 +16,12 @@ TURNING = replace(SHUTTLE, turning=7.2921151e-5)
 START = [1.5e6, 0.3, 0.5, 7000.0, 0.2, 0.9]
 
 
-def flown(vehicle, seconds: float, thrust: float = 0.0) -> np.ndarray:
+def flown(vehicle, seconds: float, bank: float = -1.0, start: list[float] = START) -> np.ndarray:
     def rates(_: float, y: np.ndarray) -> list[float]:
-        found = vehicle.rates(dict(zip(STATES, y, strict=True)), 0.3, -1.0, MASS, thrust)
+        found = vehicle.rates(dict(zip(STATES, y, strict=True)), 0.3, bank, MASS)
         return [float(found[name]) for name in STATES]
 
-    return solve_ivp(rates, (0, seconds), START, method="DOP853", rtol=1e-11, atol=1e-9).y[:, -1]
+    return solve_ivp(rates, (0, seconds), start, method="DOP853", rtol=1e-11, atol=1e-9).y[:, -1]
 
 
 def seen_from_outside(vehicle, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -33,6 +34,15 @@ def seen_from_outside(vehicle, y: np.ndarray, t: float) -> tuple[np.ndarray, np.
     position = (vehicle.radius + h) * up
     over_ground = v * (math.sin(path) * up + math.cos(path) * (math.sin(heading) * east + math.cos(heading) * north))
     return position, over_ground + np.cross([0.0, 0.0, vehicle.turning], position)
+
+
+def test_without_bank_the_flight_stays_in_its_vertical_plane():
+    """Along the equator; and anywhere on a great circle, by Clairaut's relation."""
+    along = flown(SHUTTLE, 800.0, 0.0, [79e3, 0.0, 0.0, 7800.0, -0.017, math.pi / 2])
+    assert abs(along[2]) < 1e-12 and along[5] == pytest.approx(math.pi / 2, abs=1e-12) and along[1] > 0.8
+    end = flown(SHUTTLE, 800.0, 0.0, [79e3, 0.0, 0.2, 7800.0, -0.017, 1.0])
+    assert end[2] > 0.4
+    assert math.cos(end[2]) * math.sin(end[5]) == pytest.approx(math.cos(0.2) * math.sin(1.0), rel=1e-9)
 
 
 def test_a_planet_that_turns_changes_no_orbit():

@@ -150,10 +150,10 @@ def flight(
     heating = heating_rate(vehicle.air(states["altitude"]), states["speed"], nose)
     phase.dynamics(**vehicle.rates(states, 0.0, bank, MASS), **{"bank angle": rate, "heat load": 1e-3 * heating})
     begins, ends = ({name: of(symbol) for name, symbol in states.items()} for of in (phase.initial, phase.final))
-    for name, expression in arrival(begins, declination, MARS).items():
+    for name, expression in arrival(begins, declination).items():
         problem.constraint(name, expression, lower=0.0, upper=0.0)
     target = MARS.target / 1e3
-    problem.constraint("apoapsis", apoapsis(ends, MARS) / 1e3, lower=target, upper=target, unit="km", scale=100.0)
+    problem.constraint("apoapsis", apoapsis(ends) / 1e3, lower=target, upper=target, unit="km", scale=100.0)
     return ends, phase.final(heat)
 
 
@@ -211,7 +211,7 @@ def guess(problem: Problem, design: JudgedCapsules, nose: float, most: float, de
     planar = profile(float(design.ballistic[0]))
     time, lost = planar.time, 2.0 * np.log(planar.speed / EXIT_SPEED)
     heading = pi - 0.5 * ratio * sin(bank) * lost
-    flown = since_arrival(MARS.entry_radius, ENTRY_SPEED, float(planar.path_angle[0]), MARS) + planar.ground
+    flown = since_arrival(MARS.entry_radius, ENTRY_SPEED, float(planar.path_angle[0])) + planar.ground
     latitude = pi + radians(declination) - flown
     ahead = np.concatenate([[0.0], np.cumsum(0.5 * (np.sin(heading[1:]) + np.sin(heading[:-1])) * np.diff(planar.ground))])
     problem.phases[PHASE].guess(

@@ -123,28 +123,24 @@ def faults(
     return np.select([found for found, _ in checks], [reason for _, reason in checks], default="").astype(object)
 
 
-def capsules(nose: np.ndarray, rear: np.ndarray, front_angle: np.ndarray, rear_angle: np.ndarray, volume: float = VOLUME) -> Shapes:
-    """Capsules of a volume, of the same parameters as in `faults`; volumes are closed forms, so the size is, too.
-
-    Raises ValueError: a row has a fault, or the volume is not positive: the first one is named.
-    """
-    if not (np.isfinite(volume) and volume > 0.0):
-        raise ValueError(f"the volume of a capsule must be positive and finite, not {volume!r}")
-    nose, rear, front, back = (np.atleast_1d(np.asarray(a, float)) for a in np.broadcast_arrays(nose, rear, front_angle, rear_angle))
-    reasons = faults(nose, rear, front, back)
+def capsules(
+    nose: np.ndarray, rear: np.ndarray, front_angle: np.ndarray, rear_angle: np.ndarray, attack: np.ndarray | float = 0.0
+) -> Shapes:
+    """Capsules of the paper's volume, of the same parameters as in `faults`. Raises ValueError: a row has a fault; the first is named."""
+    reasons = faults(nose, rear, front_angle, rear_angle, attack)
     if reasons.any():
         row = int(np.flatnonzero(reasons)[0])
-        raise ValueError(f"shape {row}: {reasons[row]}")
-    return sized(nose, rear, front, back, volume)
+        raise ValueError(f"capsule {row}: {reasons[row]}")
+    return sized(*(np.atleast_1d(np.asarray(a, float)) for a in np.broadcast_arrays(nose, rear, front_angle, rear_angle)))
 
 
-def sized(nose: Any, rear: Any, front_angle: Any, rear_angle: Any, volume: float = VOLUME) -> Shapes:
-    """Capsules of a volume, of parameters that have no `faults`: arrays or expressions."""
+def sized(nose: Any, rear: Any, front_angle: Any, rear_angle: Any) -> Shapes:
+    """Capsules of parameters that have no `faults`: arrays or expressions. Volumes are closed forms, so the size is, too."""
     edge, cap = nose * cos(front_angle), nose * (1.0 - sin(front_angle))
     cone, frustum = (1.0 - edge) / tan(front_angle), (1.0 - rear) * tan(rear_angle)
     sphere = cap**2 * (3.0 * nose - cap)
     unit = np.pi / 3.0 * (sphere + cone * (1.0 + edge + edge**2) + frustum * (1.0 + rear + rear**2))
-    base = (volume / unit) ** (1.0 / 3.0)
+    base = (VOLUME / unit) ** (1.0 / 3.0)
     return Shapes(nose**0, nose, rear, front_angle, rear_angle, cap, cone, frustum, unit).scaled(base)
 
 

@@ -42,13 +42,8 @@ class JudgedCapsules:
 def shapes_of(X: np.ndarray) -> tuple[Shapes, np.ndarray]:
     """Capsules of rows of the five variables (n, 5), see `BOUNDS`, and their angles of attack, rad. Raises ValueError for a faulty one."""
     X = np.atleast_2d(np.asarray(X, float))
-    nose, rear = X[:, 0], X[:, 1]
     front, back, attack = np.radians(X[:, 2:].T)
-    reasons = faults(nose, rear, front, back, attack)
-    if reasons.any():
-        row = int(np.flatnonzero(reasons)[0])
-        raise ValueError(f"capsule {row}: {reasons[row]}")
-    return capsules(nose, rear, front, back), attack
+    return capsules(X[:, 0], X[:, 1], front, back, attack), attack
 
 
 def assess(X: np.ndarray, passage: Passage = PASSAGE) -> JudgedCapsules:

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.integrate import RK45
 
 from ... import checks
-from .mars import MARS, Mars, heating_rate, shield_fraction
+from .mars import MARS, heating_rate, shield_fraction
 from .passage import PASSAGE
 
 FLOOR, FARTHEST = 10e3, 10_000e3
@@ -80,12 +80,9 @@ class Dispersions:
 
     def __post_init__(self) -> None:
         for name, most in (("entry_angle", 1.0), ("density", 0.2), ("ballistic", 0.2)):
-            if not 0.0 <= checks.number(getattr(self, name), f"dispersions: {name}") <= most:
-                raise ValueError(f"dispersions: {name} must be from 0 to {most:g}, not {getattr(self, name):g}")
+            checks.check_interval(f"dispersions: {name}", getattr(self, name), f"[0, {most:g}]")
         for name, least in (("cases", 1), ("seed", 0)):
-            value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or value < least:
-                raise ValueError(f"dispersions: {name} must be a whole number of at least {least}, not {value!r}")
+            checks.check_count(f"dispersions: {name}", getattr(self, name), least)
 
     def draw(self) -> Cases:
         """The cases, the same for all designs: differences between these are then not those of the draws."""
@@ -126,12 +123,13 @@ class Exits:
     heat: np.ndarray  # Heat load at the stagnation point of a nose of 1 m, J/cm2.
     lowest: np.ndarray  # Least altitude, m.
 
-    def inverse_apoapsis(self, mars: Mars = MARS) -> np.ndarray:
-        """Target radius over the apoapsis radius. It is continuous from ellipses to hyperbolas, of which it is negative."""
-        momentum = mars.entry_radius * self.speed * np.cos(self.path_angle)
-        excess = self.speed**2 * mars.entry_radius / mars.mu
-        eccentricity = np.hypot((excess - 1.0) * np.cos(self.path_angle), np.sin(self.path_angle))
-        return mars.target_radius * mars.mu * (1.0 - eccentricity) / momentum**2
+
+def inverse_apoapsis(speed: np.ndarray, path_angle: np.ndarray) -> np.ndarray:
+    """Target radius over the apoapsis radius after an exit. It is continuous from ellipses to hyperbolas, of which it is negative."""
+    momentum = MARS.entry_radius * speed * np.cos(path_angle)
+    excess = speed**2 * MARS.entry_radius / MARS.mu
+    eccentricity = np.hypot((excess - 1.0) * np.cos(path_angle), np.sin(path_angle))
+    return np.asarray(MARS.target_radius * MARS.mu * (1.0 - eccentricity) / momentum**2)
 
 
 @dataclass(frozen=True)
@@ -190,23 +188,23 @@ def with_solved_bank(capsule: Capsule, cases: Cases) -> DispersedOutcome:
     return _outcome(capsule, fly(capsule, cases, _constant(upward)), upward)
 
 
-def two_burns(speed: np.ndarray, path_angle: np.ndarray, mars: Mars = MARS) -> np.ndarray:
+def two_burns(speed: np.ndarray, path_angle: np.ndarray) -> np.ndarray:
     """Delta v to the circular target orbit, m/s, after exits on ellipses: the first burn, at the apoapsis, brings the other apsis to the
     target radius, and the second one there makes the orbit a circle.
 
     Lu, Cerimele, Tigges and Matz, "Optimal aerocapture guidance", Journal of Guidance, Control, and Dynamics 38(4), 2015. With
     the apoapsis on the target it is `mars.circularisation`.
     """
-    goal = mars.target_radius
-    apoapsis = goal / Exits(speed, path_angle, speed, speed).inverse_apoapsis(mars)
-    slow = mars.entry_radius * speed * np.cos(path_angle) / apoapsis
+    goal = MARS.target_radius
+    apoapsis = goal / inverse_apoapsis(speed, path_angle)
+    slow = MARS.entry_radius * speed * np.cos(path_angle) / apoapsis
     between = apoapsis + goal
-    first = np.abs(np.sqrt(2.0 * mars.mu * goal / (apoapsis * between)) - slow)
-    return np.asarray(first + np.abs(np.sqrt(2.0 * mars.mu * apoapsis / (goal * between)) - np.sqrt(mars.mu / goal)))
+    first = np.abs(np.sqrt(2.0 * MARS.mu * goal / (apoapsis * between)) - slow)
+    return np.asarray(first + np.abs(np.sqrt(2.0 * MARS.mu * apoapsis / (goal * between)) - np.sqrt(MARS.mu / goal)))
 
 
 def _outcome(capsule: Capsule, exits: Exits, upward: np.ndarray | None = None) -> DispersedOutcome:
-    inverse = exits.inverse_apoapsis()
+    inverse = inverse_apoapsis(exits.speed, exits.path_angle)
     goal = MARS.target_radius
     # False for NaN, too.
     captured = inverse >= goal / (MARS.radius + FARTHEST)
@@ -239,7 +237,8 @@ def _solved_lift(capsule: Capsule, cases: Cases) -> np.ndarray:
     (active,) = _only(slice(None), np.arange(k))
     for _ in range(TRIALS):
         trial = upward[active]
-        excess = fly(capsule, cases[active], _constant(trial)).inverse_apoapsis() - 1.0
+        exits = fly(capsule, cases[active], _constant(trial))
+        excess = inverse_apoapsis(exits.speed, exits.path_angle) - 1.0
         excess = np.where(np.isnan(excess), np.inf, excess)
         under = excess > 0.0
         done = (np.abs(excess) <= near) | (under & (trial >= most)) | (~under & (trial <= -most))

@@ -57,49 +57,49 @@ ARRIVAL_SPEED, EXIT_SPEED = 5000.0, 3500.0
 """Excess speed of the arrival, and speed at which the air is left in the paper's coupled optimisation, m/s."""
 
 
-def entry_speed(arrival_speed: float, mars: Mars = MARS) -> float:
+def entry_speed(arrival_speed: float) -> float:
     """Speed at the interface of a hyperbola with an excess speed, m/s: eq. (12)."""
-    return float(np.sqrt(arrival_speed**2 + 2.0 * mars.mu / mars.entry_radius))
+    return float(np.sqrt(arrival_speed**2 + 2.0 * MARS.mu / MARS.entry_radius))
 
 
-def exit_speeds(mars: Mars = MARS) -> tuple[float, float]:
+def exit_speeds() -> tuple[float, float]:
     """Least and greatest speed at the interface of an ellipse whose apoapsis is on the target orbit, m/s: vertical and level exits."""
-    ratio = mars.entry_radius / mars.target_radius
-    vertical = 2.0 * mars.mu * (1.0 / mars.entry_radius - 1.0 / mars.target_radius)
+    ratio = MARS.entry_radius / MARS.target_radius
+    vertical = 2.0 * MARS.mu * (1.0 / MARS.entry_radius - 1.0 / MARS.target_radius)
     return float(np.sqrt(vertical)), float(np.sqrt(vertical / (1.0 - ratio**2)))
 
 
-def exit_angle(speed: float, mars: Mars = MARS) -> float:
+def exit_angle(speed: float) -> float:
     """Path angle at the interface, rad, that brings the apoapsis to the target orbit: eqs. (13)-(16).
 
     Raises ValueError: no angle does, for the speed is outside `exit_speeds`.
     """
-    least, greatest = exit_speeds(mars)
+    least, greatest = exit_speeds()
     if not least <= speed <= greatest:
         raise ValueError(f"an exit at {speed:g} m/s cannot reach the target orbit tangentially; {least:.1f} to {greatest:.1f} m/s can")
-    above = max(speed**2 - 2.0 * mars.mu * (1.0 / mars.entry_radius - 1.0 / mars.target_radius), 0.0)
-    return float(np.arccos(min(mars.target_radius * np.sqrt(above) / (speed * mars.entry_radius), 1.0)))
+    above = max(speed**2 - 2.0 * MARS.mu * (1.0 / MARS.entry_radius - 1.0 / MARS.target_radius), 0.0)
+    return float(np.arccos(min(MARS.target_radius * np.sqrt(above) / (speed * MARS.entry_radius), 1.0)))
 
 
-def circularisation(speed: Any, mars: Mars = MARS) -> Any:
+def circularisation(speed: Any) -> Any:
     """Delta v, m/s, of the burn at the target orbit after an exit at a speed whose apoapsis is there: eq. (27). Numbers, arrays, CasADi."""
-    energy = speed**2 - 2.0 * mars.mu * (1.0 / mars.entry_radius - 1.0 / mars.target_radius)
-    return (mars.mu / mars.target_radius) ** 0.5 - energy**0.5
+    energy = speed**2 - 2.0 * MARS.mu * (1.0 / MARS.entry_radius - 1.0 / MARS.target_radius)
+    return (MARS.mu / MARS.target_radius) ** 0.5 - energy**0.5
 
 
-def exit_speed(delta_v: float, mars: Mars = MARS) -> float:
+def exit_speed(delta_v: float) -> float:
     """Speed at the interface, m/s, after which the burn at the target orbit takes a delta v, m/s: `circularisation` solved for it.
 
     Raises ValueError: no exit to the target orbit has this delta v.
     """
-    vertical, level = exit_speeds(mars)
-    least, most = float(circularisation(level, mars)), float(np.sqrt(mars.mu / mars.target_radius))
+    vertical, level = exit_speeds()
+    least, most = float(circularisation(level)), float(np.sqrt(MARS.mu / MARS.target_radius))
     if not least <= delta_v <= most:
         raise ValueError(f"no exit to the target orbit has a delta v of {delta_v:g} m/s; {least:.1f} to {most:.1f} m/s are possible")
     return float(np.hypot(most - delta_v, vertical))
 
 
-def arrival(begins: Mapping[str, Any], declination: float, mars: Mars) -> dict[str, Any]:
+def arrival(begins: Mapping[str, Any], declination: float) -> dict[str, Any]:
     """What vanishes if the capsule comes from the right direction: components of its velocity far away across that, by name.
 
     The velocity far away is along e / |e|^2 + sqrt(1 - 1 / |e|^2) q, with the eccentricity vector e towards the periapsis, and q a right
@@ -110,8 +110,8 @@ def arrival(begins: Mapping[str, Any], declination: float, mars: Mars) -> dict[s
     east = ca.vertcat(-ca.sin(lon), ca.cos(lon), 0.0)
     north = ca.vertcat(-ca.sin(lat) * ca.cos(lon), -ca.sin(lat) * ca.sin(lon), ca.cos(lat))
     velocity = v * (ca.sin(path) * up + ca.cos(path) * (ca.sin(heading) * east + ca.cos(heading) * north))
-    momentum = ca.cross((mars.radius + h) * up, velocity)
-    e = ca.cross(velocity, momentum) / mars.mu - up
+    momentum = ca.cross((MARS.radius + h) * up, velocity)
+    e = ca.cross(velocity, momentum) / MARS.mu - up
     size = ca.sumsqr(e)
     ahead = ca.cross(momentum, e) / ca.sqrt(ca.sumsqr(momentum) * size)
     asymptote = e / size + ca.sqrt(1.0 - 1.0 / size) * ahead
@@ -121,27 +121,27 @@ def arrival(begins: Mapping[str, Any], declination: float, mars: Mars) -> dict[s
     }
 
 
-def apoapsis(ends: Mapping[str, Any], mars: Mars) -> Any:
+def apoapsis(ends: Mapping[str, Any]) -> Any:
     """Altitude of the apoapsis of the orbit after the exit, m: eq. (26) of Armellin and Lavagna (see `mars`)."""
-    r, path = mars.radius + ends["altitude"], ends["flight-path angle"]
-    return r / (2.0 - _excess(r, ends["speed"], mars)) * (1.0 + eccentricity(r, ends["speed"], path, mars)) - mars.radius
+    r, path = MARS.radius + ends["altitude"], ends["flight-path angle"]
+    return r / (2.0 - _excess(r, ends["speed"])) * (1.0 + eccentricity(r, ends["speed"], path)) - MARS.radius
 
 
-def eccentricity(r: Any, speed: Any, path: Any, mars: Mars) -> Any:
+def eccentricity(r: Any, speed: Any, path: Any) -> Any:
     """Of the orbit through a point at a radius, m, with a speed, m/s, and a path angle, rad."""
-    return ca.sqrt((_excess(r, speed, mars) - 1.0) ** 2 * ca.cos(path) ** 2 + ca.sin(path) ** 2)
+    return ca.sqrt((_excess(r, speed) - 1.0) ** 2 * ca.cos(path) ** 2 + ca.sin(path) ** 2)
 
 
-def since_arrival(r: float, speed: float, path: float, mars: Mars) -> float:
+def since_arrival(r: float, speed: float, path: float) -> float:
     """Angle, rad, that a hyperbola has turned about the planet since it was far away."""
-    excess = _excess(r, speed, mars)
+    excess = _excess(r, speed)
     anomaly = ca.atan2(excess * cos(path) * sin(path), excess * cos(path) ** 2 - 1.0)
-    return float(ca.acos(-1.0 / eccentricity(r, speed, path, mars)) + anomaly)
+    return float(ca.acos(-1.0 / eccentricity(r, speed, path)) + anomaly)
 
 
-def _excess(r: Any, speed: Any, mars: Mars) -> Any:
+def _excess(r: Any, speed: Any) -> Any:
     """Squared speed over that of the circle."""
-    return r * speed**2 / mars.mu
+    return r * speed**2 / MARS.mu
 
 
 CONSTANT = 1.35e-8

@@ -17,17 +17,26 @@ value, and better: `tests/problems/aerocapture/test_passage.py`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from functools import cache
+from dataclasses import dataclass, fields
+from functools import cache, cached_property
 
 import numpy as np
 
 from transcription.numerics.polynomials import lagrange_integrals, lagrange_matrix, monomials, nodes
 
-from .mars import ARRIVAL_SPEED, EXIT_SPEED, MARS, Mars, entry_speed, exit_angle, heating_rate
+from .mars import ARRIVAL_SPEED, EXIT_SPEED, MARS, entry_speed, exit_angle, heating_rate
 
 RANGE = (5.0, 4000.0)
 """Ballistic coefficients for which passages are solved, kg/m2; those of the paper's capsules are 45 to 300."""
+STRETCH = float(np.sqrt(MARS.entry_radius / MARS.scale_height))
+"""k, the root of the interface's radius over the scale height."""
+LENGTH = np.sqrt(MARS.entry_radius * MARS.scale_height)
+"""Of a unit of the arc, m: ds = v dt over this, eq. (6)."""
+INTERVALS, DEGREE = 8, 10
+"""Of the collocation."""
+POINTS = nodes("lobatto", DEGREE)
+SUMS = lagrange_integrals(POINTS, POINTS)[1:]
+"""Integrals of the Lagrange functions from the first of these nodes to each of the others, (degree, degree + 1)."""
 STEPS = 40
 """Most Newton steps; 4 to 7 are usual."""
 TOLERANCE = 1e-6
@@ -36,19 +45,18 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Passage:
-    """Statement of the boundary value problem, and the mesh on which it is solved."""
+    """Statement of the boundary value problem."""
 
-    mars: Mars = MARS
     arrival_speed: float = ARRIVAL_SPEED  # Excess speed of the hyperbola, m/s.
     exit_speed: float = EXIT_SPEED  # Speed at which the air is left, m/s.
-    intervals: int = 8  # Of the collocation, as the degree.
-    degree: int = 10
-    entry_speed: float = field(init=False)
-    exit_angle: float = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "entry_speed", entry_speed(self.arrival_speed, self.mars))
-        object.__setattr__(self, "exit_angle", exit_angle(self.exit_speed, self.mars))
+    @cached_property
+    def entry_speed(self) -> float:
+        return entry_speed(self.arrival_speed)
+
+    @cached_property
+    def exit_angle(self) -> float:
+        return exit_angle(self.exit_speed)
 
     @property
     def slowing(self) -> float:
@@ -56,18 +64,9 @@ class Passage:
         return 2.0 * float(np.log(self.entry_speed / self.exit_speed))
 
     @property
-    def stretch(self) -> float:
-        """k, the root of the interface's radius over the scale height."""
-        return float(np.sqrt(self.mars.entry_radius / self.mars.scale_height))
-
-    @property
     def pull(self) -> float:
         """delta: gravity at the interface, over what a circle at the entry speed asks for; eq. (9)."""
-        return self.mars.mu / (self.mars.entry_radius * self.entry_speed**2)
-
-    def drag(self, ballistic: np.ndarray) -> np.ndarray:
-        """eps of ballistic coefficients in kg/m2; eq. (9), mended."""
-        return np.sqrt(self.mars.entry_radius * self.mars.scale_height) * self.mars.density / ballistic
+        return MARS.mu / (MARS.entry_radius * self.entry_speed**2)
 
 
 PASSAGE = Passage()
@@ -153,15 +152,13 @@ class PassageProfile:
 def profile(ballistic: float, passage: Passage = PASSAGE) -> PassageProfile:
     """The passage of one ballistic coefficient, kg/m2, in time. Raises what `passages` does."""
     _, arc, Y = _solved(_within(np.asarray(ballistic)), passage)
-    mars = passage.mars
     states = Y[0]
     speed = passage.entry_speed * np.exp(-0.5 * states[..., 1])
-    altitude = mars.interface - mars.scale_height * states[..., 0]
-    length = np.sqrt(mars.entry_radius * mars.scale_height)
-    half = 0.5 * float(arc[0]) / passage.intervals
+    altitude = MARS.interface - MARS.scale_height * states[..., 0]
+    half = 0.5 * float(arc[0]) / INTERVALS
 
     def since_entry(rate: np.ndarray) -> np.ndarray:
-        inside = half * (rate @ _integrals(passage.degree).T)
+        inside = half * (rate @ SUMS.T)
         until = np.cumsum(inside[:, -1])
         from_exit = inside + np.concatenate([[0.0], until[:-1]])[:, None]
         return until[-1] - np.append(0.0, from_exit.ravel())[::-1]
@@ -170,18 +167,18 @@ def profile(ballistic: float, passage: Passage = PASSAGE) -> PassageProfile:
         return np.append(values[0, 0], values[:, 1:].ravel())[::-1]
 
     return PassageProfile(
-        since_entry(length / speed),
+        since_entry(LENGTH / speed),
         along(altitude),
         along(speed),
         along(states[..., 2]),
-        since_entry(length * np.cos(states[..., 2]) / (mars.radius + altitude)),
-        since_entry(_heating(speed, states[..., 0], passage) * length / speed),
+        since_entry(LENGTH * np.cos(states[..., 2]) / (MARS.radius + altitude)),
+        since_entry(_heating(speed, states[..., 0]) * LENGTH / speed),
     )
 
 
 def _solved(bc: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lift (n,), arc (n,) and states (n, intervals, degree + 1, 3), from the exit to the entry; raises what `passages` does."""
-    eps = passage.drag(bc)
+    eps = LENGTH * MARS.density / bc  # eq. (9), mended
     lift, arc, Y = _guess(bc, eps, passage)
     active = np.arange(len(bc))
     for _ in range(STEPS):
@@ -202,7 +199,7 @@ def _named(bc: np.ndarray) -> str:
 
 def _guess(bc: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lift, arc and states (n, intervals, degree + 1, 3) to begin with: two parabolas of z that meet where drag is greatest."""
-    tau = (np.arange(passage.intervals)[:, None] + 0.5 * (nodes("lobatto", passage.degree) + 1.0)) / passage.intervals
+    tau = (np.arange(INTERVALS)[:, None] + 0.5 * (POINTS + 1.0)) / INTERVALS
     # Measured once, for 120 kg/m2, with the change for e times as much.
     lift, arc = -0.146 - 0.02 * np.log(bc / 120.0), 18.4 + 2.75 * np.log(bc / 120.0)
     deepest, where = np.log(0.25 / eps), 0.72
@@ -211,7 +208,7 @@ def _guess(bc: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarra
     Y = np.empty((len(bc), *tau.shape, 3))
     Y[..., 0] = deepest[:, None, None] * (1.0 - share**2)
     Y[..., 1] = passage.slowing * (1.0 - np.clip((tau - 0.5) / 0.4, 0.0, 1.0))
-    Y[..., 2] = np.clip((deepest / (arc * passage.stretch))[:, None, None] * (-2.0 * share / side), -0.2, 0.2)
+    Y[..., 2] = np.clip((deepest / (arc * STRETCH))[:, None, None] * (-2.0 * share / side), -0.2, 0.2)
     Y[:, 0, 0] = 0.0, passage.slowing, passage.exit_angle
     return lift, arc, Y
 
@@ -224,21 +221,20 @@ def _newton(Y: np.ndarray, arc: np.ndarray, lift: np.ndarray, eps: np.ndarray, p
     """One Newton step from states Y (n, intervals, degree + 1, 3), whose intervals begin where the ones before end: states, arc and lift
     after it, and its size (n,), of which 1 is the largest that is taken whole."""
     n, m, q = len(Y), Y.shape[1], Y.shape[2] - 1
-    sums = _integrals(passage.degree)
     rates, jacobian, by_lift = _rates(Y, lift, eps, passage)
     half = (0.5 * arc / m)[:, None, None, None]
-    moved = half * (sums @ rates)
+    moved = half * (SUMS @ rates)
     # Inside of an interval: dY = P [dY at its beginning, d arc, d lift, 1].
     matrix = np.empty((n, m, q, 3, q, 3))
-    inner = (half * sums[:, 1:])[..., None, None]
+    inner = (half * SUMS[:, 1:])[..., None, None]
     np.multiply(-inner, jacobian[:, :, None, 1:], out=matrix.transpose(0, 1, 2, 4, 3, 5))
     matrix = matrix.reshape(n, m, 3 * q, 3 * q)
     matrix += np.eye(3 * q)
     right = np.empty((n, m, q, 3, 6))
-    right[..., :3] = (half * sums[:, :1])[..., None] * jacobian[:, :, :1]
+    right[..., :3] = (half * SUMS[:, :1])[..., None] * jacobian[:, :, :1]
     right[..., :3] += np.eye(3)
     right[..., 3] = moved / arc[:, None, None, None]
-    right[..., 4] = half * (sums @ by_lift)
+    right[..., 4] = half * (SUMS @ by_lift)
     right[..., 5] = moved - (Y[:, :, 1:] - Y[:, :, :1])
     P = np.linalg.solve(matrix, right.reshape(n, m, 3 * q, 6))
     # Between the intervals, from the exit on, where nothing changes.
@@ -260,16 +256,9 @@ def _newton(Y: np.ndarray, arc: np.ndarray, lift: np.ndarray, eps: np.ndarray, p
     return Y, arc + share * d_arc, lift + share * d_lift, size
 
 
-@cache
-def _integrals(degree: int) -> np.ndarray:
-    """Integrals of the Lagrange functions from the first Lobatto node to each of the others, (degree, degree + 1)."""
-    points = nodes("lobatto", degree)
-    return lagrange_integrals(points, points)[1:]
-
-
 def _rates(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rates of the states along the arc from the exit back to the entry, their derivatives by the states, and by the lift."""
-    k, air = passage.stretch, eps[:, None, None] * np.exp(Y[..., 0])
+    k, air = STRETCH, eps[:, None, None] * np.exp(Y[..., 0])
     pull, sine, cosine = passage.pull * np.exp(Y[..., 1]), np.sin(Y[..., 2]), np.cos(Y[..., 2])
     upward = 0.5 * lift[:, None, None] * air
     rates, jacobian, by_lift = np.empty(Y.shape), np.zeros((*Y.shape, 3)), np.zeros(Y.shape)
@@ -283,29 +272,27 @@ def _rates(Y: np.ndarray, lift: np.ndarray, eps: np.ndarray, passage: Passage) -
 
 
 def _measured(bc: np.ndarray, lift: np.ndarray, arc: np.ndarray, Y: np.ndarray, passage: Passage) -> Passages:
-    mars, points = passage.mars, nodes("lobatto", passage.degree)
     speed = passage.entry_speed * np.exp(-0.5 * Y[..., 1])
-    # dt = sqrt(r_e / beta) ds / v: eq. (6).
-    rate = _heating(speed, Y[..., 0], passage) * np.sqrt(mars.entry_radius * mars.scale_height) / speed
-    heat = 0.5 * arc / passage.intervals * (rate @ _integrals(passage.degree)[-1]).sum(axis=1)
-    lowest = mars.interface - mars.scale_height * _deepest(Y, points)
+    rate = _heating(speed, Y[..., 0]) * LENGTH / speed
+    heat = 0.5 * arc / INTERVALS * (rate @ SUMS[-1]).sum(axis=1)
+    lowest = MARS.interface - MARS.scale_height * _deepest(Y)
     return Passages(bc, lift, Y[:, -1, -1, 2].copy(), lowest, heat, arc)
 
 
-def _heating(speed: np.ndarray, z: np.ndarray, passage: Passage) -> np.ndarray:
+def _heating(speed: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Heating rate of a nose of 1 m, W/cm2."""
-    return heating_rate(passage.mars.density * np.exp(z), speed)
+    return heating_rate(MARS.density * np.exp(z), speed)
 
 
-def _deepest(Y: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _deepest(Y: np.ndarray) -> np.ndarray:
     """Greatest z (n,): where the path is level, by Newton's method on the polynomial of g in the interval in which its sign changes."""
     rows = np.arange(len(Y))
     inside = Y[rows, (Y[:, :, -1, 2] > 0.0).sum(axis=1)]
     z, g = inside[..., 0], inside[..., 2]
-    tau = points[z.argmax(axis=1)][:, None]
+    tau = POINTS[z.argmax(axis=1)][:, None]
     # Sums of monomials, of which the degree is moderate enough.
-    sums = monomials("lobatto", len(points) - 1).T
-    z, g, powers = z @ sums, g @ sums, np.arange(len(points))
+    sums = monomials("lobatto", len(POINTS) - 1).T
+    z, g, powers = z @ sums, g @ sums, np.arange(len(POINTS))
     for _ in range(4):
         value, slope = (g * tau**powers).sum(axis=1), (g[:, 1:] * powers[1:] * tau ** powers[:-1]).sum(axis=1)
         tau = np.clip(tau - (value / slope)[:, None], -1.0, 1.0)

@@ -170,8 +170,8 @@ def test_draws_are_normal():
         ({"cases": 0}, "cases must be a whole number of at least 1"),
         ({"cases": 10.5}, "cases must be a whole number"),
         ({"seed": -1}, "seed must be a whole number of at least 0"),
-        ({"density": -0.1}, "density must be from 0 to 0.2"),
-        ({"entry_angle": 2.0}, "entry_angle must be from 0 to 1"),
+        ({"density": -0.1}, "density must be in .0, 0.2."),
+        ({"entry_angle": 2.0}, "entry_angle must be in .0, 1."),
         ({"ballistic": float("nan")}, "ballistic"),
     ],
 )
