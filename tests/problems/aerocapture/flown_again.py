@@ -10,9 +10,18 @@ from scipy.integrate import solve_ivp
 from truths.corridor import DENSITY, ENTRY_SPEED, HEIGHT, MU, RADIUS, TARGET, TOP, heating
 from vectors import cross, norm
 
+from problems.cases.aerocapture.capsule import lift_and_drag
+from problems.cases.aerocapture.designs import shapes_of
+
 MASS = 946.0
 CIRCULAR = np.sqrt(MU / TARGET)
 NAMES = ("altitude", "longitude", "latitude", "speed", "flight-path angle", "heading")
+
+
+def areas(design) -> tuple[float, float, float]:
+    """Lift and drag areas over the mass, m2/kg, and nose radius, m, of a capsule by its five variables."""
+    shapes, attack = shapes_of(np.array([design]))
+    return *(float(c[0]) * np.pi * float(shapes.base[0]) ** 2 / MASS for c in lift_and_drag(shapes, attack)), float(shapes.nose[0])
 
 
 def flown_again(flight, lift: float, drag: float, nose: float) -> tuple[np.ndarray, np.ndarray]:
@@ -52,9 +61,9 @@ def flown_again(flight, lift: float, drag: float, nose: float) -> tuple[np.ndarr
     return begin, flown.y[:, -1]
 
 
-def confirm(point, lift: float, drag: float, nose: float) -> np.ndarray:
+def confirm(point, design) -> np.ndarray:
     """Raise AssertionError unless a point is flown again as it says, to the polar orbit; the state at the entry."""
-    begin, end = flown_again(point.trajectory["atmosphere"], lift, drag, nose)
+    begin, end = flown_again(point.trajectory["atmosphere"], *areas(design))
     r, v = end[:3], end[3:6]
     momentum, energy = np.cross(r, v), v @ v / 2 - MU / norm(r)
     apoapsis = -MU / (2 * energy) * (1 + norm(np.cross(v, momentum) / MU - r / norm(r)))

@@ -7,15 +7,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from flown_again import CIRCULAR, confirm
+from flown_again import CIRCULAR, areas, confirm
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from truths.corridor import DENSITY, ENTRY_SPEED, HEIGHT, MU, TARGET, TOP, apoapsis, heating
 
 from macs import optimize, sweep
 from problems import load
-from problems.cases.aerocapture.capsule import MASS, lift_and_drag
-from problems.cases.aerocapture.designs import TABLE_2, assess, shapes_of
+from problems.cases.aerocapture.designs import TABLE_2, assess
 from transcription import stated
 
 ASKED = {2: (37.0, 8.99), 3: (37.2, 7.88)}
@@ -24,14 +23,6 @@ ASKED = {2: (37.0, 8.99), 3: (37.2, 7.88)}
 
 TABLE_3 = {2: (7.98, 39.22), 3: (7.05, 38.25)}
 """Heat shield in % and delta v in m/s of these solutions after their refinement, as printed."""
-
-
-def capsule(shape: int) -> tuple[float, float, float]:
-    """Lift and drag areas over the mass, m2/kg, and nose radius, m."""
-    shapes, attack = shapes_of(np.array([TABLE_2[shape].design]))
-    lift, drag = lift_and_drag(shapes, attack)
-    per_mass = np.pi * shapes.base[0] ** 2 / MASS
-    return float(lift[0] * per_mass), float(drag[0] * per_mass), float(shapes.nose[0])
 
 
 def far_away(state: np.ndarray) -> np.ndarray:
@@ -59,7 +50,7 @@ def test_refined_solutions_flown_again(shape):
     most, shield = ASKED[shape]
     assert point.objectives["delta v"] < most
     assert point.objectives["TPS mass fraction"] < shield + 0.005
-    begin = confirm(point, *capsule(shape))
+    begin = confirm(point, TABLE_2[shape].design)
     np.testing.assert_allclose(far_away(begin), [np.cos(np.radians(20.0)), 0.0, -np.sin(np.radians(20.0))], atol=2e-6)
 
 
@@ -81,7 +72,7 @@ def test_another_mesh_another_arrival_and_a_slower_roll():
 
 def switched(entry_angle: float, at: float, shape: int) -> tuple[float, float, float]:
     """How far the apoapsis is above the target, delta v and heat shield of a flight in a plane: lift upward, downward from a time on."""
-    lift, drag, nose = capsule(shape)
+    lift, drag, nose = areas(TABLE_2[shape].design)
 
     def leg(begin, sign, t0, t1):
         def slope(_, y):
@@ -174,4 +165,4 @@ def test_the_whole_trade():
     assert front.verified.all() and len(front) >= 7
     assert front.objectives[0] == pytest.approx([36.815, assess(np.array([TABLE_2[2].design])).shield[0]], abs=0.01)
     assert front.objectives[-1, 1] < 7.2
-    confirm(front[len(front) // 2], *capsule(2))
+    confirm(front[len(front) // 2], TABLE_2[2].design)
