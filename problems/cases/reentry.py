@@ -133,13 +133,10 @@ def reentry(
     speed_tolerance: float = 350 * FOOT,
     angle_tolerance: float = radians(1.0),
 ) -> Problem:
-    """State a case.
+    """State a case, of one phase, "entry". Raises ValueError for data that make no sense, by their names.
 
     Parameters
     ----------
-    name : str
-    limits : Limits
-    zones : Zones
     mass : float
         kg; 92079 by default.
     gravity : "newtonian" or "constant"
@@ -149,16 +146,6 @@ def reentry(
         s.
     altitude_tolerance, speed_tolerance, angle_tolerance : float
         How far altitude, m, speed, m/s, and flight-path angle, rad, at the end may be from 80000 ft, 2500 ft/s and -5 degrees.
-
-    Returns
-    -------
-    Problem
-        One phase, "entry".
-
-    Raises
-    ------
-    ValueError
-        For data that make no sense, by their names.
     """
     if gravity not in GRAVITIES:
         raise ValueError(f"{name}: gravity must be {' or '.join(map(repr, GRAVITIES))}, not {gravity!r}")

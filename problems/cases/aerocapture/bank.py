@@ -70,7 +70,7 @@ def problem(
     declination: float = DECLINATION,
     bank_rate: float = BANK_RATE,
 ) -> Problem:
-    """The case.
+    """The case. Raises ValueError for a shape that is no capsule or cannot be captured, and data that make no sense.
 
     Parameters
     ----------
@@ -82,11 +82,6 @@ def problem(
         Of the velocity with which the capsule arrives from far away, deg.
     bank_rate : float
         Greatest rate of the bank angle, deg/s.
-
-    Raises
-    ------
-    ValueError
-        For a shape that is no capsule or cannot be captured, and data that make no sense.
     """
     design = _design(shape)
     planar = assess(design)
