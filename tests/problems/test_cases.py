@@ -56,12 +56,7 @@ def test_the_ascent_is_the_papers():
     assert rates == pytest.approx([2, 4e-3 * math.cos(u), 4, 4e-3 * math.sin(u) - 1.6e-3])
     assert (phase.t0.upper, phase.tf.lower, phase.tf.upper) == (0, 100, 250)
     ends = dict(zip((v.name for v in phase.states), phase.final, strict=True))
-    assert ends == {
-        "x": (-1, 200),
-        "vx": (-10, 10),
-        "y": (10, 10),
-        "vy": (0, 0),
-    }
+    assert ends == {"x": (-1, 200), "vx": (-10, 10), "y": (10, 10), "vy": (0, 0)}
     assert list(phase.initial) == [(0, 0)] * 4
     assert (phase.controls[0].lower, phase.controls[0].upper) == pytest.approx((-math.pi / 2, math.pi / 2))
 
