@@ -7,7 +7,6 @@ the states are those of its authors' published implementation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import atanh, cosh, sinh
 
 import casadi as ca
@@ -108,11 +107,6 @@ def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarra
         "vy": THRUST * k * (first - root) - GRAVITY * t,
         "u": np.arctan(z),
     }
-
-
-def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Coordinates of a trajectory by label: height over distance."""
-    return {"x [km]": values["x"], "y [km]": values["y"]}
 
 
 def _speed(tf: float) -> float:

@@ -8,7 +8,6 @@ published implementation and belong to the problem: without them a coarse mesh h
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import casadi as ca
@@ -92,12 +91,6 @@ def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarra
     found = root(missing, [np.interp(flight_time, table[:, 0], column) for column in table[:, 2:].T], tol=1e-11)
     r, vr, theta, vt, _, toward_vr, toward_vt = propagated(found.x)
     return {"time": times, "r": r, "vr": vr, "theta": theta, "vt": vt, "u": np.arctan2(toward_vt, toward_vr)}
-
-
-def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Coordinates of a trajectory by label, in the plane of its orbit."""
-    r, theta = values["r"], values["theta"]
-    return {"r cos theta [DU]": r * np.cos(theta), "r sin theta [DU]": r * np.sin(theta)}
 
 
 def _with_costates(_: float, x: np.ndarray) -> list[float]:

@@ -30,13 +30,13 @@ from .. import checks
 from ..compiled import vector_function
 from ..phase import Phase
 from ..problem import Problem
-from .flight_figures import RED, pictures, track, trajectories
+from .flight_figures import RED, pictures, trajectories
 from .winged import FOOT, GRAVITIES, POUND, SLUG, STATES, UNITS, Winged
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["betts", "betts_heating", "plot", "reentry_case1", "reentry_case2", "reentry_case3", "track"]
+__all__ = ["betts", "betts_heating", "plot", "reentry_case1", "reentry_case2", "reentry_case3"]
 
 MASS = 6309.43 * SLUG
 PRESSURE = POUND / FOOT**2

@@ -39,14 +39,14 @@ import numpy as np
 from .. import checks
 from ..phase import Phase
 from ..problem import Problem
-from .flight_figures import pictures, track, trajectories
+from .flight_figures import pictures, trajectories
 from .reentry import SHUTTLE, guess
 from .winged import FOOT, SLUG, STATES, UNITS, Winged
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot", "reference_name", "skip", "smv", "track"]
+__all__ = ["plot", "reference_name", "skip", "smv"]
 
 reference_name = "the front that gradients found"
 DESCENT, ASCENT = "descent", "ascent"

@@ -41,16 +41,13 @@ BENCH = """\
 Ratios against the alternatives, measured side by side in one run, with their spread: absolute times depend on the machine.
 
 constrained MW1-14 and DTLZ with constraints: MACS against the other algorithms at equal evaluations, hypervolume
-density     shooting on equal intervals, and on as many that follow the trajectory: error when simulated, and of the objective
 front       whole fronts by MACS until it is done, by its other inner levels to the same quality, and by sweeps from one and ten starts
-generation  how the time of a generation of NSGA-III grows with individuals, nodes and constraints, beside the orders of its paper
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 many        DTLZ with 5 and 8 objectives, likewise: distance from the front, hypervolume
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 parts       MACS without one of its parts at a time, on problems that nothing was tuned on: hypervolume, time, number of problems solved
 peers       the examples of YAPSS, from statement to solution, here, in YAPSS and in rockit: pip install 'macs-trajectories[peers]'
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
-prefer      MACS guided by a preference against an even one, in the region of interest, at equal evaluations
 scale       how time and memory grow with elements, nodes, phases, variables, points and agents: exponents beside the limit of 1.1
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and counted work
 standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
@@ -59,8 +56,8 @@ zdt         ZDT1-4 and 6, likewise
 study       a study with two processes against one, and how much longer it takes than its runs do
 
 What is asked is printed beside the measured values, and judged by medians of rounds or seeds. The exit code is 1 where anything is missed.
-Ctrl-C prints the values measured so far. MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the whole inner
-benchmark and that of populations show both."""
+Ctrl-C prints the values measured so far. MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the benchmark of
+populations shows both."""
 
 
 DECIDE = """\

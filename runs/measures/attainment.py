@@ -47,16 +47,11 @@ class Attainment:
 
 
 def attainment(fronts: Sequence[Points]) -> Attainment:
-    """The attainment surfaces of several runs."""
+    """The attainment surfaces of several runs of two or three objectives, some of which are Fronts or have points."""
     goals = goals_of(fronts)
     rows = [minimised(front, goals, f"front {i}") for i, front in enumerate(fronts)]
     filled = [part for part in rows if part.size]
-    widths = {part.shape[1] for part in filled} | ({len(goals)} if goals else set())
-    if not widths:
-        raise ValueError("no run has a point: without one, the number of objectives is not known")
-    if len(widths) > 1 or not widths <= {2, 3}:
-        raise ValueError(f"attainment surfaces are of two or three objectives, the same of all runs, not of {sorted(widths)}")
-    m = widths.pop()
+    m = len(goals) if goals else filled[0].shape[1]
     signs = np.array([goal.sign for goal in goals]) if goals else np.ones(m)
     corners = [np.empty((0, m))] * len(rows)
     if filled:
@@ -101,11 +96,6 @@ def band(histories: Sequence[History], *, larger: bool = False, moments: int = 4
     infinite, it has failed, which is worse than any value.
     """
     runs = [(np.asarray(x, dtype=float), np.asarray(y, dtype=float)) for x, y in histories]
-    if not runs:
-        raise ValueError("there is no run to draw the history of")
-    for i, (x, y) in enumerate(runs):
-        if x.ndim != 1 or x.shape != y.shape or not len(x) or not np.all(np.diff(x) >= 0):
-            raise ValueError(f"run {i}: moments {x.shape} and values {y.shape} must be as many, one at least, and moments increase")
     grid = np.unique(np.concatenate([x for x, _ in runs]))
     if len(grid) > moments:
         grid = grid[np.unique(np.linspace(0, len(grid) - 1, moments).astype(int))]

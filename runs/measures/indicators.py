@@ -148,8 +148,6 @@ def hypervolume_at(front: Points, point: Sequence[float]) -> float:
     """Volume that the front dominates, in the objectives' own units, up to a point (m,) in the users' units and senses. 0 if it is
     empty."""
     F = minimised(front, None)
-    if isinstance(front, Front) and len(point) != len(front.goals):
-        raise ValueError(f"point: {len(point)} numbers, but {len(front.goals)} objectives: {', '.join(front.names)}")
     signs = [goal.sign for goal in front.goals] if isinstance(front, Front) else np.ones(len(point))
     return float(moocore.hypervolume(np.ascontiguousarray(F), ref=np.multiply(point, signs))) if len(F) else 0.0
 
@@ -271,15 +269,13 @@ class Scale:
     curve: bool  # whether its points are taken as the curve through them
 
     @classmethod
-    def of(cls, reference: Points, *, goals: Sequence[Objective] | None = None, what: str = "the reference", curve: bool = True) -> Scale:
-        """The normalisation by a reference (k, m)."""
-        goals = goals_of([reference]) or goals
-        R = truth(reference, goals)
-        goals = goals or [Objective(f"objective {i + 1}") for i in range(R.shape[1])]
+    def of(cls, reference: Front, *, what: str = "the reference", curve: bool = True) -> Scale:
+        """The normalisation by a reference."""
+        goals, R = reference.goals, truth(reference)
         ideal, unit = extent(R)
         sign = np.array([goal.sign for goal in goals])
         best, worst, corner = (tuple((sign * values + 0.0).tolist()) for values in (ideal, R.max(axis=0), ideal + VOLUME_CORNER * unit))
-        return cls(best, worst, corner, tuple(goals), what, len(R), curve and bool(pieces(R)))
+        return cls(best, worst, corner, goals, what, len(R), curve and bool(pieces(R)))
 
     def describe(self) -> str:
         """Two sentences for a caption."""

@@ -39,16 +39,11 @@ ReferenceKey = Annotated[
 
 def union(fronts: Sequence[Points]) -> Points:
     """The non-dominated points of several fronts: the reference of a problem whose true front is not known."""
-    if not len(fronts):
-        raise ValueError("there is no front to take the union of")
     goals = goals_of(fronts)
     own = [front for front in fronts if isinstance(front, Front)]
     if len(own) == len(fronts):
         return Front.merge(own)
     rows = [minimised(front, goals, f"front {i}") for i, front in enumerate(fronts)]
-    widths = {part.shape[1] for part in rows if part.size}
-    if len(widths) > 1:
-        raise ValueError(f"the fronts differ in the number of their objectives: {sorted(widths)}")
     F = np.vstack([part for part in rows if part.size] or [rows[0]])
     F = F[nondominated(F)]
     return F if goals is None else foreign(F * [goal.sign for goal in goals], goals)
@@ -76,7 +71,6 @@ def module_of(case: str) -> SimpleNamespace:
 
     - `reference() -> array (k, m)`: its true front, in the user's units and senses;
     - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration, and `LAW`, its name;
-    - `track(values) -> {label: values, label: values}`: the track of a flight, across and up, from its states by name;
     - `plot(flights) -> {name: Figure}`: its own figures of objects with a `trajectory`;
     - `dispersed(front, settings)`: what becomes of each point of a front under dispersions, `{way to fly: outcome}`, the nominal case
       first, where an outcome has `measures() -> {(name, unit): value}`; and `Dispersions`, the dataclass of the settings.

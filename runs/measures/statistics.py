@@ -60,7 +60,7 @@ class Overall:
 
 def summarise(values: Sequence[float] | np.ndarray, *, larger: bool = False) -> SampleSummary:
     """The numbers of a sample (n,), n >= 1; see `SampleSummary`. One run has a mean, but no variance."""
-    costs = _costs(values, larger, "the sample")
+    costs = _costs(values, larger)
     sign = -1.0 if larger else 1.0
     good = sign * costs[np.isfinite(costs)]
     lower, upper = sorted(sign * _quantile(costs, share) for share in (0.25, 0.75))
@@ -84,7 +84,7 @@ def pairwise(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: boo
     """
     from scipy.stats import mannwhitneyu, rankdata
 
-    costs = _all_costs(samples, larger)
+    costs = {name: _costs(values, larger) for name, values in samples.items()}
     pairs = [*combinations(costs, 2)]
     found = []
     for one, other in pairs:
@@ -106,7 +106,7 @@ def overall(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: bool
     """
     from scipy.stats import kruskal, rankdata
 
-    costs = _all_costs(samples, larger)
+    costs = {name: _costs(values, larger) for name, values in samples.items()}
     names, columns = list(costs), list(costs.values())
     ends = np.cumsum([len(column) for column in columns])[:-1]
     ranks = np.split(rankdata(np.concatenate(columns)), ends)
@@ -116,7 +116,7 @@ def overall(samples: Mapping[str, Sequence[float] | np.ndarray], *, larger: bool
 
 def a12(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, *, larger: bool = False) -> float:
     """Probability that a value of `a` is better than one of `b`, a tie being half (Vargha and Delaney 2000)."""
-    first, second = _costs(a, larger, "the first sample")[:, None], _costs(b, larger, "the second sample")
+    first, second = _costs(a, larger)[:, None], _costs(b, larger)
     better, worse = int((first < second).sum()), int((first > second).sum())
     return 0.5 + 0.5 * (better - worse) / (len(first) * len(second))
 
@@ -131,26 +131,16 @@ def effect(a12: float) -> str:
 def holm(p: Sequence[float] | np.ndarray) -> np.ndarray:
     """p-values (k,) corrected for being k, by Holm's step-down method (1979), in the order given."""
     p = np.asarray(p, dtype=float)
-    if not np.all((p >= 0) & (p <= 1)):
-        raise ValueError(f"p-values lie between 0 and 1: {p.tolist()}")
     order = np.argsort(p, kind="stable")
     corrected = np.empty(len(p))
     corrected[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)))
     return corrected
 
 
-def _costs(values: Sequence[float] | np.ndarray, larger: bool, name: str) -> np.ndarray:
+def _costs(values: Sequence[float] | np.ndarray, larger: bool) -> np.ndarray:
     """Values (n,) of which smaller is better; infinite for failed runs."""
     values = np.asarray(values, dtype=float)
-    if values.ndim != 1 or not len(values):
-        raise ValueError(f"{name} must be a list of at least one number, not an array of shape {values.shape}")
     return np.where(np.isfinite(values), -values if larger else values, np.inf)
-
-
-def _all_costs(samples: Mapping[str, Sequence[float] | np.ndarray], larger: bool) -> dict[str, np.ndarray]:
-    if len(samples) < 2:
-        raise ValueError(f"to compare, it takes the samples of at least 2 solvers; there are {', '.join(samples) or 'none'}")
-    return {name: _costs(values, larger, f"the sample of '{name}'") for name, values in samples.items()}
 
 
 def _quantile(costs: np.ndarray, share: float) -> float:

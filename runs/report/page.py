@@ -117,8 +117,8 @@ def print_standing(pages: Iterable[Path], digest_of: Callable[[str], str]) -> bo
     return all(good for _, good in found.values())
 
 
-PICTURES = ("fronts", "hypervolume-over-charged-evaluations", "choices", "goal", "dispersions")
-"""Ends, or beginnings, of the names of the figures on a page."""
+PICTURES = ("fronts", "hypervolume-over-charged-evaluations")
+"""Ends of the names of the figures on a page."""
 
 
 class Page:
@@ -158,7 +158,7 @@ class Page:
 
     def figure(self, name: str, figure: Figure) -> None:
         """Add a figure, if it is of those on pages."""
-        if not any(name.endswith(one) or name.startswith(one) for one in PICTURES):
+        if not name.endswith(PICTURES):
             return
         content = io.BytesIO()
         figure.savefig(content, format="png", dpi=100)

@@ -70,8 +70,6 @@ def front_figure(
 ) -> Figure:
     """All points of all runs: one colour and marker a solver, the truth as a line where it is dense."""
     m, signs = len(goals), np.array([goal.sign for goal in goals])
-    if m < 2:
-        raise ValueError("there are no fronts of two or more objectives to draw")
     pairs = list(combinations(range(m), 2))
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
@@ -107,8 +105,6 @@ def attainment_figure(
 
     The area between best and worst is shaded. A surface that is empty, because runs are, is not drawn; the legend names it.
     """
-    if len(goals) != 2:
-        raise ValueError(f"attainment surfaces are drawn of two objectives, not of {len(goals)}")
     signs = np.array([goal.sign for goal in goals])
     corners = [one for surface in surfaces.values() for one in surface.corners]
     if reference is not None:

@@ -5,28 +5,26 @@ A kind of table is a class: the keys that a study file states, and how its figur
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
 
 from macs.baselines.population import PopulationSolver
-from macs.decisions import FuzzySatisfactory, Preference, Ranges, from_dict
+from macs.decisions import Preference, Ranges, from_dict
 from macs.io.text import counted
-from problems.checks import unknown
-from problems.compiled import Objective
 
 from ..execution.task import FinalStates
 from ..files import Number, Section, Text, check_known, checked, errors_begin_with, is_number
-from ..measures.indicators import Scale, hypervolume_at
+from ..measures.indicators import Scale, hypervolume_at, normalised
 from ..measures.statistics import summarise
 from .choices import chosen
 from .comparison import Comparison, samples, spent
 from .tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
+    from macs.front import Front
     from macs.solvers.solver import Solver
     from problems.compiled import CompiledProblem
     from problems.vector import CompiledVectorProblem
@@ -58,8 +56,8 @@ class PublishedTable(Section, tag_field="of", kw_only=True):
     note: Text = ""  # how the paper's figures were obtained
     differs: Text = ""  # what differs in ours; "{runs}" stands for the number of our runs
 
-    statistics: ClassVar[bool] = False  # whether there are several rows for each solver, by their `statistic`: usually one of `STATISTICS`
-    statistic_head: ClassVar[str] = STATISTIC
+    statistic_head: ClassVar[str] = ""  # head of the column of `statistic`, where there are several rows for each solver
+    words: ClassVar[Collection[str] | None] = None  # what it may be in a row of the paper: one of these, if none any; None: rows have none
     population: ClassVar[bool] = False  # whether ours are of solvers with a population alone
     further: ClassVar[Mapping[str, Head]] = {}  # columns after those of the paper, of our figures alone
     how: ClassVar[str] = ""  # how our figures were obtained
@@ -69,12 +67,8 @@ class PublishedTable(Section, tag_field="of", kw_only=True):
         """{key of a figure: head of its column}; None where the keys are names of objectives."""
         return None
 
-    def theirs(self, row: Mapping[str, Any]) -> Figures:
-        """The figures of a row of the paper."""
-        return row
-
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        """{solver: rows of figures} of our runs."""
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        """Rows of figures of a solver's runs; empty if it has none."""
         raise NotImplementedError
 
     def remark(self, comparison: Comparison) -> str:
@@ -94,17 +88,15 @@ class PublishedTable(Section, tag_field="of", kw_only=True):
                     raise ValueError(f"it is of the same as row {seen.index(name) + 1}: {', '.join(name)}")
                 seen.append(name)
 
-    def _check_statistic(self, given: Any) -> None:
-        if not isinstance(given, str) or given not in STATISTICS:
-            raise ValueError(f"{STATISTIC} must be one of {', '.join(STATISTICS)}, not {given!r}")
-
     def _check_row(self, row: Mapping[str, Any]) -> None:
         if not all(isinstance(row.get(key), str) for key in ROW):
             raise ValueError(f"it must be a table with problem and by, not {row!r}")
-        if self.statistics:
-            self._check_statistic(row.get(STATISTIC))
-        elif STATISTIC in row:
+        given = row.get(STATISTIC)
+        if self.words is None and STATISTIC in row:
             raise ValueError(f"{STATISTIC}: this kind of table has none")
+        if self.words is not None and (not isinstance(given, str) or (self.words and given not in self.words)):
+            known = f"one of {', '.join(self.words)}" if self.words else "a text"
+            raise ValueError(f"{STATISTIC} must be {known}, not {given!r}")
         keys = figures_of(row)
         if self.columns is not None:
             check_known("key", keys, self.columns)
@@ -128,29 +120,21 @@ class Indicators(PublishedTable, tag="indicators"):
     }
     further: ClassVar[Mapping[str, Head]] = {f"{key}_all": Head(f"mean {key.upper()}, all solvers", digits=4) for key in ("gd", "igd")}
 
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        times, together = spent(comparison)["time [s]"], self._indicators(comparison)
-        rows: dict[str, list[Figures]] = {}
-        for solver in comparison.runs:
-            if solver in together:
-                alone = self._indicators(comparison.only(solver)).get(solver, {})
-                seconds = {"seconds": float(np.mean(times[solver]))} if solver in times else {}
-                rows[solver] = [{**alone, **seconds, "gd_all": together[solver]["gd_mean"], "igd_all": together[solver]["igd_mean"]}]
-        return rows
-
-    @staticmethod
-    def _indicators(comparison: Comparison) -> dict[str, Figures]:
-        """By solver, to the union of all that are compared; none if that is empty."""
-        union = comparison.union() if comparison.every else None
-        if union is None or not len(union.front):
-            return {}
-        found = samples(comparison, union, curve=False)
-        rows: dict[str, dict[str, Cell]] = {who: {} for who in found["GD"]}
-        for key in ("GD", "IGD"):
-            for who, values in found[key].items():
-                summary = summarise(values)
-                rows[who] |= {f"{key.lower()}_mean": summary.mean, f"{key.lower()}_variance": summary.variance}
-        return dict(rows)
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        if solver not in comparison.runs or not len(comparison.fronts[solver]) + comparison.failures.get(solver, 0):
+            return []
+        own, figures = comparison.only(solver), dict[str, Cell]()
+        for among in (own, comparison):
+            union = among.union() if among.every else None
+            if union is not None and len(union.front):
+                found = samples(own, union, curve=False)
+                gd, igd = (summarise(found[name][solver]) for name in ("GD", "IGD"))
+                if among is own:
+                    figures |= {"gd_mean": gd.mean, "gd_variance": gd.variance, "igd_mean": igd.mean, "igd_variance": igd.variance}
+                else:
+                    figures |= {"gd_all": gd.mean, "igd_all": igd.mean}
+        times = spent(own)["time [s]"].get(solver)
+        return [figures | ({"seconds": float(np.mean(times))} if times else {})] if figures else []
 
     def remark(self, comparison: Comparison) -> str:
         union = comparison.union()
@@ -168,13 +152,9 @@ class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):
 
     columns: ClassVar[Mapping[str, Head]] = {key: Head(key, digits=5) for key in ("best", "median", "worst")}
 
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        rows: dict[str, list[Figures]] = {}
-        for solver, fronts in comparison.fronts.items():
-            values = [hypervolume_at(front, self.point) for front in fronts] + [0.0] * comparison.failures.get(solver, 0)
-            if values:
-                rows[solver] = [{"best": max(values), "median": float(np.median(values)), "worst": min(values)}]
-        return rows
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        values = [hypervolume_at(front, self.point) for front in comparison.fronts[solver]] + [0.0] * comparison.failures.get(solver, 0)
+        return [{"best": max(values), "median": float(np.median(values)), "worst": min(values)}] if values else []
 
     def remark(self, comparison: Comparison) -> str:
         goals = zip(comparison.known.goals, self.point, strict=True)
@@ -191,11 +171,11 @@ class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):
 class Objectives(PublishedTable, tag="objectives"):
     """Statistics of each objective over the points of all runs."""
 
-    statistics: ClassVar[bool] = True
+    statistic_head: ClassVar[str] = STATISTIC
+    words: ClassVar[Collection[str] | None] = STATISTICS
 
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        names, found = comparison.known.names, _points(comparison)
-        return {solver: _statistics(dict(zip(names, objectives.T, strict=True))) for solver, (_, objectives) in found.items()}
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        return _statistics(dict(zip(comparison.known.names, _objectives(comparison.fronts[solver]).T, strict=False)))
 
     def remark(self, comparison: Comparison) -> str:
         without = [solver for solver, fronts in comparison.fronts.items() if fronts and not any(map(len, fronts))]
@@ -203,19 +183,14 @@ class Objectives(PublishedTable, tag="objectives"):
         return f"over the points of all runs; deviation and variance with divisor n - 1.{none}"
 
 
-def _points(comparison: Comparison) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """F and objectives (n, m) of all points of each solver that has some."""
-    found = {solver: [front for front in fronts if len(front)] for solver, fronts in comparison.fronts.items()}
-    return {
-        solver: (np.vstack([front.F for front in fronts]), np.vstack([front.objectives for front in fronts]))
-        for solver, fronts in found.items()
-        if fronts
-    }
+def _objectives(fronts: Sequence[Front]) -> np.ndarray:
+    """Objectives (n, m) of the points of several fronts together; (0, 0) if there is none."""
+    return np.vstack([front.objectives for front in fronts if len(front)] or [np.empty((0, 0))])
 
 
 def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:
-    """A row for each of `STATISTICS`, of samples by name."""
-    return [{STATISTIC: name, **{key: float(of(values)) for key, values in columns.items()}} for name, of in STATISTICS.items()]
+    """A row for each of `STATISTICS`, of samples by name; none if there are no samples."""
+    return [{STATISTIC: name, **{key: float(of(values)) for key, values in columns.items()}} for name, of in STATISTICS.items() if columns]
 
 
 class FinalTarget(Section):
@@ -229,14 +204,7 @@ class FinalTarget(Section):
 
     def final(self, states: FinalStates) -> np.ndarray:
         """The state (n,) at the end of the last phase that has it."""
-        found = [one[self.state] for one in states.values() if self.state in one]
-        if not found:
-            raise ValueError(f"paper: {self.no_state([name for one in states.values() for name in one])}")
-        return found[-1]
-
-    def no_state(self, known: Sequence[str]) -> str:
-        """That there is no such state."""
-        return f"ends: '{self.name}': {unknown('state', self.state, dict.fromkeys(known))}"
+        return [one[self.state] for one in states.values() if self.state in one][-1]
 
 
 class FinalErrors(Objectives, tag="ends", kw_only=True):
@@ -248,27 +216,17 @@ class FinalErrors(Objectives, tag="ends", kw_only=True):
     def columns(self) -> Mapping[str, Head]:
         return {end.name: Head(end.name, end.unit, digits=4) for end in self.ends}
 
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        rows: dict[str, list[Figures]] = {}
-        for solver, runs in comparison.counting.items():
-            found = [one.ends for one in runs if len(one.front)]
-            if found:
-                away = {end.name: np.concatenate([end.final(states) for states in found]) - end.at for end in self.ends}
-                rows[solver] = _statistics({end.name: end.factor * np.abs(away[end.name]) for end in self.ends})
-        return rows
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        found = [one.ends for one in comparison.counting.get(solver, ()) if len(one.front)]
+        if not found:
+            return []
+        away = [np.abs(np.concatenate([end.final(states) for states in found]) - end.at) for end in self.ends]
+        return _statistics({end.name: end.factor * distance for end, distance in zip(self.ends, away, strict=True)})
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
-        known = [v.name for phase in problem.phases for v in phase.states]
         for end in self.ends:
-            if end.state not in known:
-                raise ValueError(end.no_state(known))
-
-    def __post_init__(self) -> None:
-        names = [end.name for end in self.ends]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"ends: '{name}' is there twice")
-        super().__post_init__()
+            with errors_begin_with(f"ends: '{end.name}'"):
+                check_known("state", [end.state], {v.name: None for phase in problem.phases for v in phase.states})
 
 
 class Feasibility(PublishedTable, tag="feasibility"):
@@ -286,25 +244,22 @@ class Feasibility(PublishedTable, tag="feasibility"):
     }
     how: ClassVar[str] = "generations from 1, the first population; means of the runs that got there; points are means of a run."
 
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        rows: dict[str, list[Figures]] = {}
-        for solver, runs in comparison.runs.items():
-            populations = [run.front.stats["population"] for run in runs if "population" in run.front.stats]
-            if not populations:
-                continue
-            figures: dict[str, Cell] = {}
-            count = len(populations) + comparison.failures.get(solver, 0)
-            for key in ("first_feasible", "all_feasible"):
-                reached = [one[key] for one in populations if one[key] is not None]
-                figures[key] = float(np.mean(reached)) if reached else None
-                # A run that failed, or never got there, is later than any other.
-                middle = float(np.median([*reached, *[np.inf] * (count - len(reached))]))
-                figures[f"{key}_median"] = middle if np.isfinite(middle) else None
-                figures[f"{key}_never"] = count - len(reached)
-            figures["points"] = float(np.mean([one["nondominated"] for one in populations]))
-            figures["counted"] = float(np.mean([len(one.front) for one in comparison.counting[solver]]))
-            rows[solver] = [figures]
-        return rows
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        populations = [run.front.stats["population"] for run in comparison.runs.get(solver, ()) if "population" in run.front.stats]
+        if not populations:
+            return []
+        figures: dict[str, Cell] = {}
+        count = len(populations) + comparison.failures.get(solver, 0)
+        for key in ("first_feasible", "all_feasible"):
+            reached = [one[key] for one in populations if one[key] is not None]
+            figures[key] = float(np.mean(reached)) if reached else None
+            # A run that failed, or never got there, is later than any other.
+            middle = float(np.median([*reached, *[np.inf] * (count - len(reached))]))
+            figures[f"{key}_median"] = middle if np.isfinite(middle) else None
+            figures[f"{key}_never"] = count - len(reached)
+        figures["points"] = float(np.mean([one["nondominated"] for one in populations]))
+        figures["counted"] = float(np.mean([len(one.front) for one in comparison.counting[solver]]))
+        return [figures]
 
 
 BEST = "best "
@@ -314,28 +269,23 @@ BEST = "best "
 class PayoffTable(PublishedTable, tag="payoff"):
     """The ends of the front. The `statistic` of a row is "best" and the name of an objective."""
 
-    statistics: ClassVar[bool] = True
+    statistic_head: ClassVar[str] = STATISTIC
+    words: ClassVar[Collection[str] | None] = ()
     how: ClassVar[str] = "for each objective, the point of all runs that is best in it, and then in the others in their order."
 
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        goals, rows = comparison.known.goals, dict[str, list[Figures]]()
-        for solver, (F, objectives) in _points(comparison).items():
-            ranges = np.where(np.ptp(F, axis=0) > 0, np.ptp(F, axis=0), 1.0)
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        goals, objectives, rows = comparison.known.goals, _objectives(comparison.fronts[solver]), list[Figures]()
+        if len(objectives):
             # Solves agree to some digits only: what is equal within 1e-5 of the range is equal.
-            keys = np.round((F - F.min(axis=0)) / ranges, 5)
-            rows[solver] = []
+            keys = np.round(normalised(F := objectives * [goal.sign for goal in goals], F)[0], 5)
             for i, goal in enumerate(goals):
                 order = [i, *(k for k in range(len(goals)) if k != i)]
                 best = objectives[np.lexsort(keys[:, order[::-1]].T)[0]].tolist()
-                rows[solver].append({STATISTIC: BEST + goal.name, **dict(zip(comparison.known.names, best, strict=True))})
+                rows.append({STATISTIC: BEST + goal.name, **dict(zip(comparison.known.names, best, strict=True))})
         return rows
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         check_known(STATISTIC, [row[STATISTIC] for row in self.rows], {BEST + goal.name: goal.name for goal in problem.goals})
-
-    def _check_statistic(self, given: Any) -> None:
-        if not isinstance(given, str) or not given.startswith(BEST):
-            raise ValueError(f"{STATISTIC} must be '{BEST}' and the name of an objective, not {given!r}")
 
 
 class Degrees(PublishedTable, tag="degrees", kw_only=True):
@@ -344,45 +294,27 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
 
     # The preference by which all choices are measured, {"method": ..., "settings": {...}}. Default: each by its own.
     by: dict[str, Any] | None = None
-    # Values of lambda for which eq. (53) of Bae and others is evaluated at the memberships, those of the paper's rows, too. Then these
-    # are in order of priority.
-    regulating: tuple[Number, ...] = ()
+    regulating: Any = None  # of studies that older versions made; it means nothing now
 
-    statistics: ClassVar[bool] = True
     statistic_head: ClassVar[str] = "choice"
+    words: ClassVar[Collection[str] | None] = ()
 
     @property
     def columns(self) -> Mapping[str, Head]:
-        found = {name: Head(name, "degree", digits=4) for name in self._names}
-        return found | {key: Head(key, digits=4) for key in self._more}
+        return {name: Head(name, "degree", digits=4) for name in self._names}
 
-    def theirs(self, row: Mapping[str, Any]) -> Figures:
-        degrees = [row.get(name) for name in self._names]
-        return row if None in degrees else {**row, **self._satisfactory(np.array(degrees, dtype=float))}
-
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        rows: dict[str, list[Figures]] = {}
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        rows: list[Figures] = []
         for one in chosen(comparison):
-            named = dict(zip((goal.name for goal in one.point.goals), one.degrees(self.preference).tolist(), strict=True))
-            more = self._satisfactory(np.array([named[name] for name in self._names]))
-            mark = "" if one.point.verified else " (not verified)"
-            rows.setdefault(one.solver, []).append({STATISTIC: one.label + mark, **named, **more})
+            if one.solver == solver:
+                mark = "" if one.point.verified else " (not verified)"
+                degrees = zip((goal.name for goal in one.point.goals), one.degrees(self.preference).tolist(), strict=True)
+                rows.append({STATISTIC: one.label + mark, **dict(degrees)})
         return rows
 
     def remark(self, comparison: Comparison) -> str:
         by = "the preference that chose" if self.preference is None else repr(self.preference)
-        return f"degrees of ours by {by}.{''.join(f' {one}' for one in self.optima())}"
-
-    def optima(self) -> list[str]:
-        """For each lambda, the least value of eq. (53) over the paper's rows and both ends of its front."""
-        known = {f"best {name}": self._satisfactory(end) for name, end in zip(self._names, np.eye(len(self._names)), strict=True)}
-        known |= {row[STATISTIC]: self.theirs(row) for row in self.rows}
-        found = []
-        for weight, key in zip(self.regulating, self._more[1:], strict=True):
-            values = {name: value for name, figures in known.items() if isinstance(value := figures.get(key), float)}
-            least = min(values, key=lambda name: values[name])
-            found.append(f"With lambda = {weight:g}, eq. (53) is least, of the paper's rows and ends, at '{least}': {values[least]:.4g}.")
-        return found
+        return f"degrees of ours by {by}."
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         names = [goal.name for goal in problem.goals]
@@ -402,24 +334,6 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
         """Names of the objectives."""
         return list(dict.fromkeys(key for row in self.rows for key in figures_of(row)))
 
-    @property
-    def _more(self) -> list[str]:
-        return ["kappa", *(f"(53) at {weight:g}" for weight in self.regulating)] if self.regulating else []
-
-    def _satisfactory(self, degrees: np.ndarray) -> Figures:
-        """kappa and eq. (53), for each lambda, at memberships (m,); nothing without a lambda."""
-        if not self.regulating:
-            return {}
-        goals = [Objective(name, "", "maximize") for name in self._names]
-        ranges = Ranges(dict.fromkeys(self._names, 1.0), dict.fromkeys(self._names, 0.0))
-        goal = FuzzySatisfactory({}, self._names)
-        values = [replace(goal, regulating=weight).stages(goals, ranges)[0].numbers(degrees[None])[0] for weight in self.regulating]
-        return dict(zip(self._more, map(float, [goal.kappa(goals, ranges, degrees[None])[0], *values]), strict=True))
-
-    def _check_statistic(self, given: Any) -> None:
-        if not isinstance(given, str) or not given:
-            raise ValueError(f"{STATISTIC} must name a choice, not {given!r}")
-
     def __post_init__(self) -> None:
         if self.by is not None:
             with errors_begin_with("by"):
@@ -431,24 +345,27 @@ class DominatedDesigns(PublishedTable, tag="designs"):
     """Designs with a figure for every objective; for each, of all runs, the verified point of the greatest least gain in all objectives,
     each a share of the design's figure. Where that is not positive, no point dominates the design."""
 
-    statistics: ClassVar[bool] = True
     statistic_head: ClassVar[str] = "beside"
     further: ClassVar[Mapping[str, Head]] = {GAIN: Head(GAIN, "%", digits=3)}
 
-    def ours(self, comparison: Comparison) -> dict[str, list[Figures]]:
-        designs = [row for row in self.rows if row["problem"] == comparison.problem]
-        rows: dict[str, list[Figures]] = {}
-        for solver, fronts in comparison.fronts.items():
-            # Points that a simulation confirms; of fronts that were not simulated all.
-            points = [front.objectives[front.verified | ~front.was_simulated] for front in fronts]
-            if designs and sum(map(len, points)):
-                rows[solver] = [{STATISTIC: row["by"], **_best_gain(row, comparison, np.vstack(points))} for row in designs]
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        # Points that a simulation confirms; of fronts that were not simulated all.
+        objectives = _objectives([front[front.verified | ~front.was_simulated] for front in comparison.fronts[solver]])
+        goals, rows = comparison.known.goals, list[Figures]()
+        for row in self.rows if len(objectives) else ():
+            if row["problem"] == comparison.problem:
+                figures = np.array([row[goal.name] for goal in goals])
+                gains = (np.array([goal.sign for goal in goals]) * (figures - objectives) / np.abs(figures)).min(axis=1)
+                best = dict(zip(comparison.known.names, objectives[gains.argmax()].tolist(), strict=True))
+                rows.append({STATISTIC: row["by"], **best, GAIN: 100.0 * float(gains.max())})
         return rows
 
     def remark(self, comparison: Comparison) -> str:
+        every = {solver: self.ours(comparison, solver) for solver in comparison.fronts}
         counts = [
             f"{solver} dominates {sum(float(str(one[GAIN])) > 0.0 for one in found)} of {len(found)} designs"
-            for solver, found in self.ours(comparison).items()
+            for solver, found in every.items()
+            if found
         ]
         return (
             f"{', '.join(counts) or 'no point that counts'}. Beside each design, the point that is better in all objectives by the largest "
@@ -457,28 +374,9 @@ class DominatedDesigns(PublishedTable, tag="designs"):
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         for row in self.rows:
-            missing = [goal.name for goal in problem.goals if goal.name not in row]
+            missing = [goal.name for goal in problem.goals if not row.get(goal.name)]
             if missing:
-                raise ValueError(f"the design '{row['by']}' has no {', '.join(missing)}: figures of all objectives are compared")
-
-    def _check_statistic(self, given: Any) -> None:
-        if given is not None:
-            raise ValueError(f"{STATISTIC}: this kind of table has none")
-
-    def _check_row(self, row: Mapping[str, Any]) -> None:
-        super()._check_row(row)
-        for key in figures_of(row):
-            if row[key] == 0:
-                raise ValueError(f"{key} must not be 0: gains are shares of it")
-
-
-def _best_gain(design: Mapping[str, Any], comparison: Comparison, objectives: np.ndarray) -> Figures:
-    """Of points with objectives (n, m), that of the greatest least gain on a design, with the gain in %."""
-    goals = comparison.known.goals
-    figures = np.array([design[goal.name] for goal in goals])
-    gains = (np.array([goal.sign for goal in goals]) * (figures - objectives) / np.abs(figures)).min(axis=1)
-    best = int(gains.argmax())
-    return {**dict(zip(comparison.known.names, objectives[best].tolist(), strict=True)), GAIN: 100.0 * float(gains[best])}
+                raise ValueError(f"the design '{row['by']}' has no {', '.join(missing)} other than 0: gains are shares of all figures")
 
 
 KINDS = Indicators | Hypervolume | Objectives | FinalErrors | Feasibility | PayoffTable | Degrees | DominatedDesigns
@@ -542,17 +440,17 @@ def _beside(comparisons: Sequence[Comparison], paper: PublishedTable, study: Map
         def cells(figures: Figures, took: float | None) -> list[Cell]:
             own = figures.get("seconds")
             ratio: list[Cell] = [took / own if took and isinstance(own, float) else None] if timed else []
-            return [*([figures.get(STATISTIC)] if paper.statistics else []), *(figures.get(key) for key in keys), *ratio]
+            return [*([figures.get(STATISTIC)] if paper.statistic_head else []), *(figures.get(key) for key in keys), *ratio]
 
-        rows += [[problem, row["by"], None, *cells(paper.theirs(row), None)] for row in theirs]
+        rows += [[problem, row["by"], None, *cells(row, None)] for row in theirs]
         seen = set[tuple[str, str]]()
         for comparison in here:
-            for solver, figures in paper.ours(comparison).items():
-                place = comparison.place(solver)
-                if (solver, place) not in seen:  # one that works apart is on each of the others' comparisons
+            for solver in comparison.fronts:
+                figures, place = paper.ours(comparison, solver), comparison.place(solver)
+                if figures and (solver, place) not in seen:  # one that works apart is on each of the others' comparisons
                     runs = len(comparison.fronts[solver]) + comparison.failures.get(solver, 0)
                     rows += [[problem, f"{solver}, {place}", runs, *cells(one, took)] for one in figures]
-                seen.add((solver, place))
+                    seen.add((solver, place))
         remarks = {comparison.transcription: paper.remark(comparison) for comparison in here}
         if len(set(remarks.values())) == 1:
             notes.append(f"{problem}: {remarks[here[0].transcription]}")
@@ -560,8 +458,8 @@ def _beside(comparisons: Sequence[Comparison], paper: PublishedTable, study: Map
             notes += [f"{problem}, {place}: {note}" for place, note in remarks.items()]
     if not rows:
         return None
-    heads: list[Head | str] = [Head("problem", grouped=True), *(Head(name, grouped=paper.statistics) for name in ("by", "runs"))]
-    heads += [paper.statistic_head] if paper.statistics else []
+    heads: list[Head | str] = [Head("problem", grouped=True), *(Head(name, grouped=bool(paper.statistic_head)) for name in ("by", "runs"))]
+    heads += [paper.statistic_head] if paper.statistic_head else []
     units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
     known = {**(columns or {}), **paper.further}
     heads += [known.get(key) or Head(key, units.get(key, ""), digits=4) for key in keys]

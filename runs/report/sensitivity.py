@@ -15,7 +15,7 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
-from macs.fronts.pictures.style import COLORS, axis_label, better
+from macs.fronts.pictures.style import COLORS, better
 from macs.fronts.verified import check_alike
 from problems.checks import unknown
 
@@ -40,11 +40,6 @@ LOOKS: Mapping[str, Mapping[str, Any]] = {
     "those not feasible": {"marker": "x", "ms": 3.0, "mew": 0.6, "color": COLORS[0], "zorder": 4},
     "found under these data": {"marker": "o", "ms": 3.0, "mew": 0, "color": COLORS[1], "zorder": 2},
 }
-WAY_LOOKS: Sequence[Mapping[str, Any]] = (
-    {"marker": "o", "ms": 2.0, "mew": 0, "color": "black", "zorder": 3},
-    {"marker": "v", "ms": 3.0, "mew": 0.6, "mfc": "none", "color": COLORS[1], "zorder": 2},
-    {"marker": "o", "ms": 3.0, "mew": 0.6, "mfc": "none", "color": COLORS[0], "zorder": 2},
-)
 
 
 def check_nominal(nominal: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem]) -> None:
@@ -109,7 +104,7 @@ class ChangedData:
 
     def tables(self) -> dict[str, Table]:
         """{name of a file: table}."""
-        found = {"changed-data": self._shifts(), "changed-data-points": self._points(), "changed-data-best": self._best()}
+        found = {"changed-data": self._shifts(), "changed-data-best": self._best()}
         return {name: one for name, one in found.items() if one.rows or one.notes}
 
     def figures(self) -> dict[str, Figure]:
@@ -141,16 +136,6 @@ class ChangedData:
         ]
         notes += [f"{one.solver}, {one.transcription}: {one.note}." for one in self.changes if one.note]
         return table(heads, rows, f"The front of {self.nominal} under changed data.", notes)
-
-    def _points(self) -> Table:
-        heads: list[Head | str] = [*_WHOSE, Head("point", grouped=True), "data", "feasible", *_heads(self._goals)]
-        rows: list[list[Cell]] = []
-        for one in self.changes:
-            for number, k in enumerate(representatives(one.nominal) if one.simulated else [], 1):
-                for problem, front in one.simulated.items():
-                    feasible = "yes" if front.status[k] == CONVERGED else "no"
-                    rows.append([one.transcription, one.solver, f"point {number}", problem, feasible, *front.objectives[k].tolist()])
-        return table(heads, rows, f"Points of the front of {self.nominal}, each under changed data with the same controls.")
 
     def _best(self) -> Table:
         heads: list[Head | str] = [*_WHOSE, "optimised under", "points", *_heads(self._goals)]
@@ -211,21 +196,16 @@ def changed_figure(change: Change) -> Figure:
             ax.set_title(source.name if source is not None and ".py:" in problem else problem, loc="left")
             if place % columns == 0 or shared != "all":
                 ax.set_ylabel(better(goals[k]))
-        _finish(figure, grid, len(places), better(goals[0]), 2 if columns == 1 else 4)
+        for place, ax in enumerate(grid[: len(places)]):
+            if place + columns >= len(places):  # the last of its column
+                ax.set_xlabel(better(goals[0]))
+                ax.tick_params(labelbottom=True)
+        for ax in grid[len(places) :]:
+            ax.remove()
+        handles, names = grid[0].get_legend_handles_labels()
+        look = {"loc": "outside upper left", "ncols": 2 if columns == 1 else 4, "frameon": False, "handletextpad": 0.3}
+        figure.legend(handles, names, **look)
     return figure
-
-
-def _finish(figure: Any, grid: Sequence[Any], count: int, xlabel: str, columns: int) -> None:
-    """The label below the last panel of each column, a legend above all, and no panels beyond `count`."""
-    across = grid[0].get_subplotspec().get_gridspec().ncols
-    for place, ax in enumerate(grid[:count]):
-        if place + across >= count:
-            ax.set_xlabel(xlabel)
-            ax.tick_params(labelbottom=True)
-    for ax in grid[count:]:
-        ax.remove()
-    handles, names = grid[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper left", ncols=columns, frameon=False, handletextpad=0.3)
 
 
 def check_dispersions(given: Any, problems: Mapping[str, CompiledProblem | CompiledVectorProblem]) -> None:
@@ -265,8 +245,8 @@ class DispersedFront:
         return {f"{self.name}-{self.solver}-dispersed-{way}": self._table(way) for way in [*self.measures][1:]}
 
     def figures(self) -> dict[str, Figure]:
-        """{name of a file: figure} of each measure along the front."""
-        return {f"{self.name}-{self.solver}-dispersed": dispersed_figure(self)}
+        """None: the tables have all."""
+        return {}
 
     def _table(self, way: str) -> Table:
         measured = self.measures[way]
@@ -296,23 +276,3 @@ def dispersed_fronts(comparisons: Sequence[Comparison], study: Mapping[str, Any]
             ways = {way: [one[way].measures() for one in flown] for way in flown[0]}
             found.append(DispersedFront(comparison.name, solver, some, settings, ways))
     return found
-
-
-def dispersed_figure(found: DispersedFront) -> Figure:
-    """Each measure over the first objective, in a panel of its own: nominal, and of the cases flown in each way."""
-    goal = found.points.goals[0]
-    panels = [*next(iter(found.measures.values()))[0]]
-    rows = -(-len(panels) // 3)
-    with style():
-        figure = new_figure(PAGE, 1.9 * rows + 0.4)
-        grid = figure.subplots(rows, 3, squeeze=False, sharex=True).ravel()
-        for ax, (name, unit) in zip(grid, panels, strict=False):
-            for (way, measured), look in zip(found.measures.items(), WAY_LOOKS, strict=False):
-                values = np.array([np.nan if one[name, unit] is None else one[name, unit] for one in measured], dtype=float)
-                ax.plot(found.points.objectives[:, 0], values, ls="", label=way, **look)
-            low, high = ax.dataLim.intervaly
-            if low > 0.0 and high > 10.0 * low:
-                ax.set_yscale("log")
-            ax.set_title(axis_label(name, unit), loc="left")
-        _finish(figure, grid, len(panels), axis_label(goal.name, goal.unit), 3)
-    return figure

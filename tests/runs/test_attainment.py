@@ -57,17 +57,6 @@ def test_senses_and_what_did_not_converge():
     assert mixed.worst.tolist() == found.worst.tolist()
 
 
-def test_what_has_no_surfaces():
-    with pytest.raises(ValueError, match="not known"):
-        attainment([EMPTY])
-    with pytest.raises(ValueError, match=r"two or three objectives, the same of all runs, not of \[4\]"):
-        attainment([np.ones((1, 4))])
-    with pytest.raises(ValueError, match=r"not of \[2, 3\]"):
-        attainment([A, np.ones((1, 3))])
-    with pytest.raises(ValueError, match="front 1 has other objectives"):
-        attainment([foreign(A, GOALS), foreign(A, GOALS[::-1])])
-
-
 def test_a_staircase_bounds_what_is_dominated():
     plain = staircase(A, np.ones(2), np.array([5.0, 6.0]))
     assert plain.tolist() == [[1, 6], [1, 3], [3, 3], [3, 1], [5, 1]]
@@ -90,11 +79,3 @@ def test_empty_fronts_are_worst():
     x = np.array([0.0, 1.0])
     found = band([(x, np.array([np.nan, 2.0])), (x, np.array([np.inf, 3.0])), (x, np.array([1.0, 1.0]))])
     assert found.median.tolist() == [np.inf, 2.0] and found.lower.tolist() == [np.inf, 1.5]
-
-
-def test_what_is_no_history():
-    with pytest.raises(ValueError, match="no run"):
-        band([])
-    for x, y in (([2.0, 1.0], [1.0, 1.0]), ([1.0], [1.0, 2.0]), ([], [])):
-        with pytest.raises(ValueError, match="run 0: moments"):
-            band([(np.array(x), np.array(y))])

@@ -274,18 +274,6 @@ def test_inner_levels_side_by_side():
     assert "No function is compiled" in BENCHES["inner"].report(rows)
 
 
-def test_batches_are_what_the_search_sends():
-    for case in (replace(case, mesh=DFET(2, 3)) for case in inner.SHORT[:2]):
-        nlp = case.mesh.transcribe(case.make())
-        candidates, warm = case.batch(nlp, np.random.default_rng(0))
-        assert candidates.shape == (inner.BATCH, len(nlp.free))
-        assert ((candidates >= nlp.lower[nlp.free]) & (candidates <= nlp.upper[nlp.free])).all()
-        assert (warm is not None) == case.warm
-        if warm is not None:
-            assert (nlp.evaluate(warm)[1] <= case.tolerance).all()
-            assert 0.0 < nlp.distance(nlp.first_guess(candidates), warm).mean() < 0.1 * len(nlp.free) ** 0.5
-
-
 def test_populations_in_one_call_and_one_by_one():
     rows = measured("population", inner.PopulationCase("shooting:130", 4), rounds=2)
     assert [row.who for row in rows] == [inner.SINGLY, inner.TOGETHER] and rows[0].values["speed"] == [1.0, 1.0]

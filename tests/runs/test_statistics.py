@@ -34,9 +34,6 @@ def test_failed_runs_are_counted_and_last():
     one = summarise([7.0])
     assert one.mean == one.median == one.best == 7.0 and np.isnan(one.variance)
     assert np.isnan(summarise([7.0, NAN]).variance)
-    for nonsense in ([], [[1.0]]):
-        with pytest.raises(ValueError, match=r"^the sample must be a list of at least one number"):
-            summarise(nonsense)
 
 
 @pytest.mark.filterwarnings("error")
@@ -58,9 +55,6 @@ def test_holm_by_hand():
     # Sorted 0.01, 0.02, 0.03, 0.04 times 4, 3, 2, 1: 0.04, 0.06, 0.06, 0.04, of which the last may not fall below those before.
     assert holm([0.04, 0.01, 0.03, 0.02]).tolist() == pytest.approx([0.06, 0.04, 0.06, 0.06])
     assert holm([0.5, 0.9]).tolist() == [1.0, 1.0] and holm([0.03]).tolist() == [0.03] and holm([]).tolist() == []
-    for nonsense in (NAN, -0.01, 1.01):
-        with pytest.raises(ValueError, match="between 0 and 1"):
-            holm([0.1, nonsense])
 
 
 def test_effects_by_hand():
@@ -151,15 +145,3 @@ def test_average_ranks_by_hand():
     data = {"a": [1.0, 2.0], "b": [2.0, 2.0], "c": [3.0, NAN]}
     assert overall(data).ranks == {"a": 2.0, "b": 3.0, "c": 5.5}
     assert overall({"a": [1.0, 2.0], "b": [5.0]}, larger=True).ranks == {"a": 2.5, "b": 1.0}
-
-
-def test_what_cannot_be_compared():
-    with pytest.raises(ValueError, match="at least 2 solvers; there are a"):
-        pairwise({"a": [1.0]})
-    with pytest.raises(ValueError, match="at least 2 solvers; there are none"):
-        overall({})
-    for a, b, name in (([], [1.0], "first"), ([1.0], [], "second")):
-        with pytest.raises(ValueError, match=rf"^the {name} sample must be"):
-            a12(a, b)
-    with pytest.raises(ValueError, match="sample of 'b' must be"):
-        pairwise({"a": [1.0], "b": []})

@@ -20,7 +20,7 @@ import numpy as np
 
 from ... import checks
 from ...problem import Problem
-from ..flight_figures import pictures, track, trajectories
+from ..flight_figures import pictures, trajectories
 from ..winged import STATES, UNITS, Winged
 from .capsule import MASS, lift_and_drag
 from .designs import TABLE_2, JudgedCapsules, assess, shapes_of
@@ -31,7 +31,7 @@ from .passage import PASSAGE, profile
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Dispersions", "dispersed", "plot", "problem", "track"]
+__all__ = ["Dispersions", "dispersed", "plot", "problem"]
 
 SHAPE, OWN = 2, "passage"
 DECLINATION, BANK_RATE = -20.0, 10.0

@@ -27,14 +27,13 @@ import numpy as np
 
 from ... import checks
 from ...problem import Problem
-from ..flight_figures import track
 from .bank import BANK_RATE, DECLINATION, STEEPEST, TRANSCRIPTION, flight, guess, plot
 from .capsule import VOLUME, ballistic_coefficient, lift_and_drag, log, sized
 from .coupled import PACKING, SHIELD, VARIABLES
 from .designs import BOUNDS, LENGTH, LIFT_TO_DRAG, TABLE_2, assess
 from .mars import circularisation, exit_angle, exit_speed, shield_fraction
 
-__all__ = ["plot", "problem", "track"]
+__all__ = ["plot", "problem"]
 
 DELTA_V, CORRIDOR = "delta v", "entry corridor"
 SIZE, SIZES = "greatest dimension", (2.0, 6.0)
