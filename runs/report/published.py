@@ -224,6 +224,8 @@ class FinalErrors(Objectives, tag="ends", kw_only=True):
         return _statistics({end.name: end.factor * distance for end, distance in zip(self.ends, away, strict=True)})
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        if len(self.columns) < len(self.ends):
+            raise ValueError("ends: no two may have the same name")
         for end in self.ends:
             with errors_begin_with(f"ends: '{end.name}'"):
                 check_known("state", [end.state], {v.name: None for phase in problem.phases for v in phase.states})
@@ -276,8 +278,9 @@ class PayoffTable(PublishedTable, tag="payoff"):
     def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
         goals, objectives, rows = comparison.known.goals, _objectives(comparison.fronts[solver]), list[Figures]()
         if len(objectives):
+            F = objectives * [goal.sign for goal in goals]
             # Solves agree to some digits only: what is equal within 1e-5 of the range is equal.
-            keys = np.round(normalised(F := objectives * [goal.sign for goal in goals], F)[0], 5)
+            keys = np.round(normalised(F, F)[0], 5)
             for i, goal in enumerate(goals):
                 order = [i, *(k for k in range(len(goals)) if k != i)]
                 best = objectives[np.lexsort(keys[:, order[::-1]].T)[0]].tolist()
