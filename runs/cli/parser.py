@@ -333,7 +333,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
         "--seeds",
         metavar="N",
         type=_positive,
-        help="number of seeds of searches (default: 10 on plain functions, 5 for prefer and search, 3 for front)",
+        help="number of seeds of searches (default: 10 on plain functions, 5 for search, 3 for front)",
     )
     bench.add_argument(
         "--jobs",
