@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.checks import apart, check_text, shown
+from problems.checks import check_text, interval, shown
 from problems.compiled import Objective, Variable
 from problems.vector import CompiledVectorProblem, real_numbers
 from transcription.trajectories.limits import excess
@@ -115,11 +115,9 @@ def plain_problem(
     for key, words in labels.items():
         if words is not None:
             m = learned(m, len(words), f"{key} has {len(words)}")
-    variables, lower, upper = read_bounds(bounds)
-    sides = zip(variables, lower.tolist(), upper.tolist(), strict=True)
     return CompiledVectorProblem(
         name=name,
-        variables=tuple(Variable(one, low, high, "", high - low) for one, low, high in sides),
+        variables=read_bounds(bounds),
         goals=() if m is None else default_goals(m, labels["names"], labels["units"], labels["senses"]),
         limits=None,
         rows=PlainRows(function, constraints),
@@ -160,38 +158,30 @@ class PlainRows:
         return values, np.hstack([np.empty((len(X), 0)), *columns])
 
 
-def read_bounds(bounds: Any) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
-    """Names (d,), lower and upper bounds (d,) from a sequence of pairs, a pair of sequences longer than two, or a dict of pairs by name."""
+def read_bounds(bounds: Any) -> tuple[Variable, ...]:
+    """The variables of a sequence of pairs, a pair of sequences longer than two (lower and upper bounds), or a dict of pairs by name."""
     if bounds is None:
         raise ValueError("bounds: missing")
-    names = tuple(str(name) for name in bounds) if isinstance(bounds, Mapping) else None
-    for name in names or ():
-        check_text(name, "bounds: the name of a variable")
+    named = isinstance(bounds, Mapping)
     try:
-        pairs = list(bounds.values() if isinstance(bounds, Mapping) else bounds)
+        pairs = list(bounds.values() if named else bounds)
     except TypeError:
         raise ValueError(f"bounds: pairs (lower, upper) expected, or a mapping of them by name, not {shown(bounds)}") from None
     if not pairs:
         raise ValueError("bounds: empty")
-    if names is None and len(pairs) == 2 and all(np.ndim(side) == 1 and len(side) > 2 for side in pairs):
+    if not named and len(pairs) == 2 and all(np.ndim(side) == 1 and len(side) > 2 for side in pairs):
         if len(pairs[0]) != len(pairs[1]):
             raise ValueError(f"bounds: {len(pairs[0])} lower and {len(pairs[1])} upper ones")
         pairs = list(zip(*pairs, strict=True))
-    names = names or tuple(f"x{i + 1}" for i in range(len(pairs)))
-    limits = np.empty((len(pairs), 2))
-    for i, (name, pair) in enumerate(zip(names, pairs, strict=True)):
-        try:
-            limits[i] = np.asarray(pair, dtype=float).reshape(2)
-        except (TypeError, ValueError):
-            raise ValueError(f"bounds: variable '{name}' has {pair!r}, a pair (lower, upper) expected") from None
-        lower, upper = limits[i]
-        if not (np.isfinite(lower) and np.isfinite(upper) and np.isfinite(upper - lower)):
-            raise ValueError(f"bounds: variable '{name}' has ({lower:g}, {upper:g}), finite numbers expected")
-        if lower >= upper:
-            raise ValueError(f"bounds: variable '{name}' has lower {lower:g} >= upper {upper:g}")
-        if not apart(lower, upper):
-            raise ValueError(f"bounds: variable '{name}' has ({float(lower)!r}, {float(upper)!r}), which leave nothing to decide")
-    return names, limits[:, 0].copy(), limits[:, 1].copy()
+    variables = []
+    for name, pair in zip(map(str, bounds) if named else (f"x{i + 1}" for i in range(len(pairs))), pairs, strict=True):
+        check_text(name, "bounds: the name of a variable")
+        what = f"the bounds of variable '{name}'"
+        lower, upper = interval(pair, what)
+        if lower == upper or not np.isfinite(upper - lower):
+            raise ValueError(f"{what}, ({lower!r}, {upper!r}), leave nothing to decide, or are too far apart")
+        variables.append(Variable(name, lower, upper, "", upper - lower))
+    return tuple(variables)
 
 
 def _labels(name: str, labels: Sequence[str] | None) -> tuple[str, ...] | None:

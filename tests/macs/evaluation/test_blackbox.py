@@ -18,29 +18,28 @@ def middle(box, count=3):
 def test_bounds_in_every_form():
     pairs = [(0, 1), (-1, 2), (3, 4)]
     for bounds in (pairs, np.array(pairs), ([0, -1, 3], [1, 2, 4]), (np.array([0, -1, 3]), np.array([1, 2, 4]))):
-        names, lower, upper = read_bounds(bounds)
-        assert names == ("x1", "x2", "x3")
-        assert (lower.tolist(), upper.tolist()) == ([0, -1, 3], [1, 2, 4])
-    assert read_bounds({"mass": (1, 2), "tf": (3, 4)})[0] == ("mass", "tf")
-    assert read_bounds([[0, 1], [2, 3]])[1].tolist() == [0, 2]  # two short ones are two pairs
+        assert [(v.name, v.lower, v.upper) for v in read_bounds(bounds)] == [("x1", 0, 1), ("x2", -1, 2), ("x3", 3, 4)]
+    assert [v.name for v in read_bounds({"mass": (1, 2), "tf": (3, 4)})] == ["mass", "tf"]
+    assert [v.lower for v in read_bounds([[0, 1], [2, 3]])] == [0, 2]  # two short ones are two pairs
 
 
 @pytest.mark.parametrize(
     ("bounds", "message"),
     [
         (None, "missing"),
-        ([(0, 1), (0.5, np.nextafter(0.5, 1))], "'x2' has .* leave nothing to decide"),
-        ([(0.0, 5e-324)], "'x1' has .* leave nothing to decide"),
+        ([(0, 1), (0.5, np.nextafter(0.5, 1))], "'x2', .* leave nothing to decide"),
+        ([(0.0, 5e-324)], "'x1', .* leave nothing to decide"),
+        ([(0, 1), (1, 1)], "'x2', .* leave nothing to decide"),
+        ([(-1e308, 1e308)], "'x1', .* too far apart"),
         (5, "bounds: pairs .* expected, .* not 5"),
-        ([5, 6], "'x1' has 5, a pair"),
+        ([5, 6], "the bounds of variable 'x1' must be a pair .* not 5"),
         ({"a\0b": (0, 1)}, "NUL"),
         ([], "empty"),
-        ({"mass": (2, 1)}, "'mass' has lower 2 >= upper 1"),
-        ([(0, 1), (1, 1)], "'x2' has lower 1 >= upper 1"),
-        ([(0, np.inf)], "'x1' has .*finite"),
-        ([(0, np.nan)], "'x1' has .*finite"),
-        ([(0, 1, 2), (0, 1)], "'x1' has .*pair"),
-        ({"mass": "heavy"}, "'mass' has 'heavy'"),
+        ({"mass": (2, 1)}, "'mass': an empty interval, 2 > 1"),
+        ([(0, np.inf)], "'x1' must be finite"),
+        ([(0, np.nan)], "'x1' must be finite"),
+        ([(0, 1, 2), (0, 1)], "'x1' must be a pair"),
+        ({"mass": "heavy"}, "'mass' must be a pair .* not 'heavy'"),
         (([0, 0, 0], [1, 1, 1, 1]), "3 lower and 4 upper"),
     ],
 )
