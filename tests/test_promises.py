@@ -2,7 +2,7 @@
 
 Elsewhere: hollow and set apart (`test_front_plot`, `test_verified`), pymoo's bits (`test_pymoo_adapter`), equalities (`test_repair`),
 switches (`test_dfet_moving_edges`), rates (`test_trade_offs`), studies (`test_study`), forged files (`test_files`, `test_checkpoint`),
-failed flights (`test_inner_levels`).
+failed flights (`test_inner`).
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from .phases.reduced import Reduced
 from .phases.rows import EndSlots, Parts, Rows
 from .phases.writer import PhaseWriter, along, filled
 from .stopping import check_stopping
-from .trajectories.trajectory import PiecewisePolynomial, Trajectory
+from .trajectories.trajectory import Trajectory
 
 WriterFactory = Callable[[CompiledPhase, Layout, EndSlots], PhaseWriter]
 
@@ -95,7 +95,6 @@ class Assembly:
             tighten=self.tighten,
             unpack=self.unpack,
             interpolate=self.interpolate,
-            costates=partial(self.costates, rows),
             widen=self.widened,
             measure=lambda: self._filled(function("quantities", **{f"q{i}": one for i, one in enumerate(quantities)})),
             adjoint=partial(self.adjoint, rows),
@@ -200,27 +199,15 @@ class Assembly:
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
 
-    def costates(self, rows: Rows, z: np.ndarray, multipliers: np.ndarray) -> dict[str, PiecewisePolynomial]:
-        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
-        found = {w.phase.name: w.costates(extended, multipliers[rows.dynamics[w.phase.name]]) for w in self._declared}
-        return {name: costates for name, costates in found.items() if costates is not None}
-
     def adjoint(
-        self,
-        rows: Rows,
-        z: np.ndarray,
-        of_rows: np.ndarray,
-        of_bounds: np.ndarray,
-        weights: Mapping[str, np.ndarray],
-        *,
-        swept: bool = False,
+        self, rows: Rows, z: np.ndarray, of_rows: np.ndarray, of_bounds: np.ndarray, weights: Mapping[str, np.ndarray]
     ) -> dict[str, Adjoint]:
         extended, found = self.layout.extended(np.asarray(z, dtype=float)[None])[0], {}
         for writer in self._declared:
             name = writer.phase.name
             paths, peaks, states = ([of_rows[one] for one in rows.samples.get((name, kind), ())] for kind in ("path", "peak", "state"))
             multipliers = PhaseMultipliers(of_rows[rows.dynamics[name]], paths, peaks, states, weights[name], of_bounds)
-            found[name] = _adjoint(writer, extended, multipliers, swept)
+            found[name] = _adjoint(writer, extended, multipliers)
         return found
 
     def interpolate(self, trajectory: Trajectory) -> np.ndarray:
@@ -287,7 +274,7 @@ class Assembly:
         for k in range(len(peaks)):
             samples = written.peak_samples[k, :]
             scale = self.layout.variables[peaks[k]].scale
-            rows.add_samples(phase.name, "peak", samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True)
+            rows.add(samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True, of=(phase.name, "peak"))
         (initials,) = rows.at_points(phase.initials, first, written.first_control, s[0], s)
         (finals,) = rows.at_points(phase.finals, last, written.last_control, s[1], s)
         largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]
@@ -315,9 +302,9 @@ class Assembly:
             rows.add(ends[0] - ends[1], 0, 0, scale, label)
 
 
-def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultipliers, swept: bool) -> Adjoint:
+def _adjoint(writer: PhaseWriter, extended: np.ndarray, multipliers: PhaseMultipliers) -> Adjoint:
     """The costates of one phase: by the adjoint equation where limits make them jump inside elements, else the method's own."""
-    known = None if swept else writer.costates(extended, multipliers.dynamics)
+    known = writer.costates(extended, multipliers.dynamics)
     if known is not None and not writer.limited(multipliers):
         return Adjoint(known)
     found = writer.swept(extended, multipliers)

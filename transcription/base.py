@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -20,7 +20,7 @@ from .numerics.batched import Batched
 from .phases.adjoint import Adjoint
 from .phases.reduced import Reduced
 from .phases.rows import Parts
-from .trajectories.trajectory import PiecewisePolynomial, Trajectory
+from .trajectories.trajectory import Trajectory
 
 CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
 """The statuses of candidates and solves: feasible within the tolerance (and optimal, where that is asked for), or the reason why not."""
@@ -36,9 +36,13 @@ class Transcription(ABC):
     Attributes
     ----------
     word : str or tuple of str
-        What the method is called on the command line, in lower case; several words, where a setting has words of its own.
+        What the method is called on the command line, in lower case; several words, where the first of its `options` is chosen by them.
     examples : str
         How it is written there, for messages.
+    further : tuple of str
+        Settings that may be written as numbers after those that have no default value: dfet:4x6 has its two, shooting:200x2 one more.
+    options : dict
+        Settings that may be written after a colon, in any order: name -> their words; none for a number.
     registered : dict
         The methods that have a word, by name of the class.
 
@@ -51,6 +55,8 @@ class Transcription(ABC):
 
     word: ClassVar[str | tuple[str, ...]] = ""
     examples: ClassVar[str] = ""
+    further: ClassVar[tuple[str, ...]] = ()
+    options: ClassVar[Mapping[str, Collection[str]]] = {}
     registered: ClassVar[dict[str, type[Transcription]]] = {}
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -73,37 +79,37 @@ class Transcription(ABC):
         return {"method": type(self).__name__, "settings": {one.name: getattr(self, one.name) for one in settings_of(self)}}
 
     @classmethod
-    def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
-        """A method as it is written on the command line, after its word: dfet:4x6:bernstein has numbers (4, 6) and options ("bernstein",).
-
-        By default the numbers are the settings that have no default value, and there are no options. A method of several words has the one
-        that was written as its first option.
+    def from_word(cls, word: str, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
+        """A method as it is written on the command line: dfet:4x6:bernstein has numbers (4, 6) and options ("bernstein",).
 
         Raises
         ------
         ValueError
             If it makes no sense.
         """
-        if options or len(numbers) != len(cls._needed()):
+        needed = [one.name for one in settings_of(cls) if one.default is MISSING]
+        if not len(needed) <= len(numbers) <= len(needed) + len(cls.further):
             raise ValueError(f"write it as {cls.examples}")
-        return cls(*numbers)
+        settings: dict[str, Any] = dict(zip((*needed, *cls.further), numbers, strict=False))
+        for option in (*(() if word == cls.word else (word,)), *options):
+            kinds = (name for name, words in cls.options.items() if (option in words if words else option.isdecimal()))
+            name = next(kinds, None)
+            if name is None or name in settings:
+                raise ValueError(f"'{option}' is given twice or unknown; write it as {cls.examples}")
+            settings[name] = option if cls.options[name] else int(option)
+        return cls(**settings)
 
     def to_word(self) -> str:
-        """The method as it is written on the command line, as far as that is possible: not all settings have a place there.
-
-        By default the settings that have no default value.
-        """
-        return f"{self.word}:{'x'.join(str(getattr(self, name)) for name in self._needed())}"
-
-    @classmethod
-    def words(cls) -> tuple[str, ...]:
-        """All words by which it is found."""
-        return cls.word if isinstance(cls.word, tuple) else (cls.word,)
-
-    @classmethod
-    def _needed(cls) -> list[str]:
-        """Names of the settings that have no default value."""
-        return [one.name for one in settings_of(cls) if one.default is MISSING]
+        """The method as it is written on the command line, as far as that is possible: not all settings have a place there."""
+        given = {one.name: (getattr(self, one.name), one.default) for one in settings_of(self)}
+        numbers = [value for name, (value, default) in given.items() if default is MISSING or (name in self.further and value != default)]
+        options = {name: str(given[name][0]) for name in self.options if given[name][0] != given[name][1]}
+        word = self.word
+        if isinstance(word, tuple):
+            setting = next(iter(self.options))
+            word = given[setting][0]
+            options.pop(setting, None)
+        return ":".join([word, "x".join(map(str, numbers)), *options.values()])
 
 
 @remembered
@@ -160,15 +166,12 @@ class NLP(Deriving):
     interpolate : callable
         A Trajectory of the same problem, by any method and mesh -> the vector (n,) nearest to it: its times and parameters, its states
         and controls where this mesh has its own, within bounds. In general it satisfies the equations only as well as both meshes do.
-    costates : callable
-        A vector (n,) and multipliers (r,) of the rows -> phase: its costates, a `PiecewisePolynomial`; without the phases of methods whose
-        multipliers say nothing between their places.
     widen : callable
         NLP -> the same one with all variables free that have bounds; see `whole`.
     adjoint : callable
         A vector (n,), multipliers (r,) of the rows and (n,) of the bounds of variables, and what a unit of each integral counts, by phase
         -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places, or
-        limits of states have multipliers; if `swept` (a keyword), everywhere.
+        limits of states have multipliers.
     measure : callable
         () -> `quantities`.
     dense : int
@@ -202,7 +205,6 @@ class NLP(Deriving):
     tighten: Callable[[np.ndarray], np.ndarray]
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
-    costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
     widen: Callable[[NLP], NLP]
     adjoint: Callable[..., dict[str, Adjoint]]
     measure: Callable[[], ca.Function]

@@ -23,14 +23,14 @@ def parse(text: str) -> Transcription:
     True
     """
     name, mesh, *options = (*text.split(":"), "")[: max(2, text.count(":") + 1)]
-    method = next((one for one in Transcription.registered.values() if name.lower() in one.words()), None)
+    methods = {each: one for one in Transcription.registered.values() for each in ([one.word] if isinstance(one.word, str) else one.word)}
+    method = methods.get(name.lower())
     numbers = mesh.split("x")
     if method is None or not all(number.isdecimal() for number in numbers):
         known = [method] if method else Transcription.registered.values()
         raise ValueError(f"unknown transcription '{text}'; write it as {', '.join(one.examples for one in known)}")
-    chosen = [name.lower()] if len(method.words()) > 1 else []
     try:
-        return method.from_word(tuple(map(int, numbers)), (*chosen, *(option for option in options if option)))
+        return method.from_word(name.lower(), tuple(map(int, numbers)), tuple(option for option in options if option))
     except ValueError as error:
         raise ValueError(f"transcription '{text}': {error}") from None
 

@@ -11,9 +11,8 @@ import numpy as np
 from problems.compiled import CompiledProblem, Objective
 from problems.vector import CompiledVectorProblem
 from transcription.base import NLP
-from transcription.nlp.costates import costates
 from transcription.nlp.elastic import opposing
-from transcription.nlp.optimality import Conditions
+from transcription.nlp.optimality import Conditions, costates
 from transcription.nlp.program import nlp_scales
 from transcription.stopping import Stopped, check_stopping
 from transcription.trajectories.costates import Costates

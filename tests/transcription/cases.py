@@ -31,6 +31,21 @@ def slot(nlp: NLP, name: str) -> int:
     return [v.name for v in nlp.variables].index(name)
 
 
+def total_derivatives(nlp: NLP, Z: np.ndarray) -> np.ndarray:
+    """Those of the reduced problem at vectors (k, n), after a look whether they are those of differences, in spans and scales, and whether
+    those of the rows at the ends alone are the same."""
+    reduced, every = nlp.reduced, np.eye(len(nlp.variables))
+    propagated = reduced.propagate(Z)
+    A = reduced.derivatives(propagated, np.arange(len(reduced.scale)))
+    for j, variable in enumerate(nlp.free):
+        low, high = (reduced.propagate(Z + side * 1e-6 * nlp.span[variable] * every[variable]).values for side in (-1, 1))
+        error = np.abs((high - low) / 2e-6 - A[:, :, j] * nlp.span[variable]) / reduced.scale
+        assert error.max() < 2e-8, nlp.variables[variable].name
+    at_ends = np.flatnonzero(~reduced.inside)
+    assert np.allclose(reduced.derivatives(propagated, at_ends), A[:, at_ends], rtol=1e-12, atol=1e-13)
+    return A
+
+
 def oscillator() -> Problem:
     """Non-linear, depends on time, has parameters and two controls; no terminal constraint."""
     problem = Problem("oscillator")

@@ -18,7 +18,7 @@ from problems import Problem, load
 from problems.cases.standard import published
 from transcription import Collocation
 from transcription.elements.tables import POINTS, collocation_tables, control_degree
-from transcription.meshes.minimum import OptimumMultipliers
+from transcription.nlp.optimality import Conditions, costates
 from transcription.nlp.scalarized import scalarize
 from transcription.numerics.polynomials import nodes
 
@@ -233,15 +233,12 @@ def test_an_integral_cost_converges_exponentially(methods):
 @pytest.mark.parametrize("method", [Collocation(1, 24), Collocation(6, 5, points="gauss")])
 def test_costates_of_a_nonlinear_problem_are_those_of_the_closed_form(method):
     nlp, solved = risen(method)
-    found = OptimumMultipliers.of(nlp, solved.z, solved.multipliers)
-    costates = found.costates["run"]
-    times = np.linspace(0, 2, 41)
-    of_one = found.of_objectives[0]
-    assert costates(times)[:, 0] / of_one == pytest.approx(exact_rise(times)[2], abs=1e-5)
-    ends = costates.ends()
-    assert ends[0][0, 0] / of_one == pytest.approx(exact_rise(0.0)[2], abs=1e-6)
-    assert ends[1][-1, 0] / of_one == pytest.approx(-1.0, abs=1e-9), "the transversality condition, exactly"
-    assert len(costates.edges) == method.intervals + 1
+    found = costates(nlp, solved.z, Conditions.of(nlp, solved.z).multipliers())["run"].polynomial
+    times, (begins, ends) = np.linspace(0, 2, 41), found.ends()
+    assert found(times)[:, 0] == pytest.approx(exact_rise(times)[2], abs=1e-5)
+    assert begins[0, 0] == pytest.approx(exact_rise(0.0)[2], abs=1e-6)
+    assert ends[-1, 0] == pytest.approx(-1.0, abs=1e-9), "the transversality condition, exactly"
+    assert len(found.edges) == method.intervals + 1
 
 
 # What a user states

@@ -1,19 +1,24 @@
+"""Inner levels: results, the nearest feasible point, what cannot be, names, starts, and what their work is."""
+
 from __future__ import annotations
 
 import subprocess
 import sys
 from dataclasses import dataclass, fields
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, integrator
+from cases import candidates, decay, integrator, oscillator
 from scipy.optimize import minimize
+from smooth_problems import nlp_of, still
 
-from macs import MACS
+from macs import MACS, NSGA3
 from problems import Problem, load
-from transcription import DFET, InnerResult, InnerSolver
-from transcription.inner import Ipopt, inner_solver
+from transcription import DFET, NLP, Collocation, InnerResult, InnerSolver, MultipleShooting, SingleShooting
+from transcription.inner import NAMED, Ipopt, Newton, Projection, Propagate, Whole, inner_solver, levels
+from transcription.inner.base import evaluation_work, propagation_work, scored, started
 
 NAMES = ("auto", "propagate", "ipopt", "ipopt-feasibility")
 STATUSES = {"converged", "infeasible", "failed", "timeout"}
@@ -36,6 +41,10 @@ def hop() -> Problem:
     problem.minimize("effort", phase.integral(phase["u"] ** 2))
     problem.maximize("first", phase.initial(phase["u"]))
     return problem
+
+
+def hop_nlp() -> NLP:
+    return DFET(2, 1).transcribe(hop())
 
 
 def impossible() -> Problem:
@@ -221,3 +230,129 @@ def test_what_misses_by_more_than_the_tolerance_has_not_converged(inner, toleran
     program = level.program(nlp)
     found = level.solve(program, whole[:, program.free], whole, tolerance=tolerance)
     assert found.violation[0] == pytest.approx(share * tolerance, rel=1e-6) and found.status.tolist() == [status]
+
+
+# Levels that need no file of their own
+
+
+@pytest.mark.parametrize(("inner", "one"), [("propagate", propagation_work), ("none", evaluation_work)])
+def test_each_candidate_takes_the_same_work_and_one_iteration(inner: str, one: Any) -> None:
+    level = inner_solver(inner)
+    program = level.program(hop_nlp())
+    for k in (1, 4):
+        found = level.solve(program, candidates(program, k))
+        assert found.work == pytest.approx(k * one(program)) and 0.0 < found.work < k, "less than an iteration of IPOPT each"
+        assert found.iterations.tolist() == [1] * k and found.iterations.dtype.kind == "i" and found.fallbacks == 0
+
+
+def test_a_propagation_that_fails_gives_the_warm_start_back() -> None:
+    nlp = DFET(2, 2).transcribe(broken())
+    C, warm = candidates(nlp, 3), np.full((3, len(nlp.variables)), 0.25)
+    found = Propagate().solve(nlp, C, warm)
+    assert set(found.status) == {"failed"} and np.array_equal(found.z[:, nlp.free], C)
+    assert (np.delete(found.z, nlp.free, axis=1) == 0.25).all()
+
+
+def test_without_an_inner_level_the_states_of_a_warm_start_are_judged_as_they_are() -> None:
+    """x' = u = 0.5 reaches 1 in 2: with the states of that flight it is feasible, with the guessed ones of 0 everywhere it is not."""
+    nlp = hop_nlp()
+    C = np.full((1, len(nlp.free)), 0.5)
+    flown = nlp.propagate(nlp.guessed(C))
+    found = Whole().solve(nlp, C, flown)
+    assert found.status.tolist() == ["converged"] and np.array_equal(found.z, flown)
+    still = flown.copy()
+    still[:, np.setdiff1d(np.arange(len(nlp.variables)), nlp.free)] = 0.0
+    assert Whole().solve(nlp, C, still).status.tolist() == ["infeasible"]
+
+
+def test_levels_are_found_by_their_names_alone() -> None:
+    for name, level in levels.NAMED.items():
+        assert inner_solver(name) is level and inner_solver(level) is level
+    for wrong in ("newton", "", None, 3, Propagate, ["auto"]):
+        with pytest.raises(
+            ValueError, match=r"unknown inner level .*; there are auto, projection, propagate, none, ipopt, ipopt-feasibility$"
+        ):
+            inner_solver(wrong)  # type: ignore[arg-type]
+
+
+def test_a_projection_is_newtons_method_and_ipopt_on_what_that_leaves() -> None:
+    """Where p = 0 there is no slope for Newton's method to follow."""
+    problem = still("root")
+    p, q = problem.parameter("p", bounds=(0.0, 1.0)), problem.parameter("q", bounds=(0.0, 2.0))
+    problem.constraint("curve", ca.sqrt(p) + q, lower=1.0, upper=1.0, scale=1.0)
+    problem.minimize("f", p + q**2)
+    nlp, C = nlp_of(problem, DFET(1, 0)), np.array([[0.25, 1.0], [0.0, 0.0], [0.0, 1.0]])
+    newton, found = (level.solve(nlp, C, tolerance=1e-8) for level in (Newton(), Projection()))
+    assert newton.status.tolist() == ["converged", "infeasible", "converged"] and set(found.status) == {"converged"}
+    ipopt = Ipopt(max_iterations=levels.PROJECTION_ITERATIONS).solve(nlp, C[[1]], tolerance=1e-8)
+    for name in ("z", "F", "violation", "status", "moved", "residuals"):
+        one, other, both = (getattr(result, name) for result in (newton, ipopt, found))
+        assert np.array_equal(both, [one[0], other[0], one[2]]), name
+    assert np.array_equal(found.iterations, newton.iterations + np.array([0, ipopt.iterations[0], 0]))
+    assert found.work == newton.work + ipopt.iterations.sum() and found.fallbacks == 1 and not found.clocked
+
+
+METHODS = (
+    DFET(2, 3),
+    Collocation(2, 4),
+    Collocation(1, 8, points="gauss"),
+    Collocation(1, 8, points="chebyshev"),
+    MultipleShooting(6),
+    SingleShooting(9),
+)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+def test_all_variables_with_bounds_are_searched_and_scored_as_they_are(method):
+    nlp = method.nlp(load("goddard").compile())
+    whole = NAMED["none"].program(nlp)
+    assert whole is nlp.whole and len(whole.free) == len(nlp.variables) and not np.array_equal(whole.free, nlp.free)
+    X = candidates(whole, 5)
+    found = inner_solver("none").solve(whole, X)
+    F, residuals = nlp.residuals(X)
+    assert np.array_equal(found.z, X) and np.array_equal(found.F, F) and not found.moved.any()
+    assert found.violation == pytest.approx(residuals.max(axis=1)) and set(found.status) == {"infeasible"}
+    flown = nlp.propagate(nlp.first_guess(candidates(nlp, 1)))
+    inside = np.clip(flown, nlp.lower, nlp.upper)
+    assert inner_solver("none").solve(whole, inside).violation == pytest.approx(nlp.evaluate(inside)[1]), "nothing is propagated"
+
+
+@pytest.mark.slow
+def test_a_population_search_has_the_dynamics_among_its_constraints():
+    method = Collocation(2, 3)
+    front = NSGA3(population=20).solve(oscillator(), method, evaluations=2_000, seed=1, inner="none", tolerance=0.05, verify=None)
+    assert len(front) and front.violation.max() <= 0.05 and front.stats["inner"] == "none" and front.stats["evaluations"] == 2_000
+    flown = front[0].simulate()
+    assert 1e-4 < flown.max_defect < 0.5, "nothing has propagated them"
+    again = NSGA3(population=20).solve(oscillator(), method, evaluations=2_000, seed=1, inner="none", tolerance=0.05, verify=None)
+    assert np.array_equal(front.F, again.F), "the same seed gives the same bits"
+    tight = NSGA3(population=20).solve(load("goddard"), method, evaluations=200, seed=1, inner="none", verify=None)
+    assert not len(tight) and "violates" in tight.message
+
+
+@pytest.mark.parametrize("kind", [float, int])
+def test_a_warm_start_gives_the_states_and_is_left_as_it_is(kind: type) -> None:
+    """Also where it has whole numbers, which are no reason to round the candidates."""
+    nlp, C = hop_nlp(), candidates(hop_nlp(), 2)
+    warm = np.full((2, len(nlp.variables)), 3, dtype=kind)
+    Z = started(nlp, C, warm)
+    states = np.setdiff1d(np.arange(len(nlp.variables)), nlp.free)
+    assert np.array_equal(Z[:, nlp.free], C) and len(states) and (Z[:, states] == 3).all()
+    assert (warm == 3).all() and np.array_equal(started(nlp, C, None), nlp.guessed(C))
+
+
+def test_scores_are_of_what_is_within_the_tolerance_and_of_what_is_no_number() -> None:
+    """The limit itself is within; what is no number has failed, and is the start again."""
+    nlp, violation = hop_nlp(), np.array([-1.0, 1e-3, np.nextafter(1e-3, 1.0), 5.0, np.nan, np.inf, 0.0])
+    broken, good = np.arange(7) > 3, np.arange(7) < 2
+    start = nlp.guessed(np.zeros((7, len(nlp.free))))
+    Z, residuals, F = start.copy(), np.full((7, len(nlp.variables) + len(nlp.g_lower)), -1.0), np.zeros((7, 2))
+    Z[:, nlp.free[0]] += 0.5 * nlp.span[nlp.free[0]]
+    residuals[:, 2], F[6, 0] = violation, np.nan
+    for otherwise in ("infeasible", "timeout"):
+        found = scored(nlp, (Z.copy(), F.copy(), residuals), start, np.full(7, otherwise), np.arange(7), 1e-3)
+        assert found.status.tolist() == np.select([broken, good], ["failed", "converged"], otherwise).tolist()
+        assert np.array_equal(found.violation, np.where(broken, np.inf, np.maximum(violation, 0.0)))
+        assert np.array_equal(np.isnan(found.F).all(axis=1), broken) and found.clocked is (otherwise == "timeout")
+        assert np.array_equal(found.z, np.where(broken[:, None], start, Z)) and found.moved == pytest.approx(np.where(broken, 0.0, 0.5))
+        assert np.array_equal(found.iterations, np.arange(7)) and found.residuals is residuals

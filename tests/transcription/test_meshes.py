@@ -179,31 +179,22 @@ def test_scales_are_what_a_quantity_does_not_its_bounds():
 
 
 def test_errors_do_not_depend_on_the_width_of_bounds():
-    wide = 1e3
-    problem = Problem("wide")
-    phase = problem.phase("run", t0=0, tf=3)
-    x = phase.state("x", bounds=(-5 * wide, 5 * wide), initial=1)
-    u = phase.control("u", bounds=(-2 * wide, 2 * wide))
-    phase.dynamics(x=-(x**3) + u)
-    problem.minimize("cost", phase.integral(x**2 + u**2))
-    nlp = DFET(3, 2).transcribe(problem)
-    values = np.sin(np.arange(len(nlp.free)))
-    z = nlp.propagate(nlp.first_guess(values[None]))[0]
-    flight = nlp.unpack(z)
-    found, verdict = errors(nlp, flight), assessed(nlp, z)
-    narrow = Problem("narrow")
-    phase = narrow.phase("run", t0=0, tf=3)
-    x = phase.state("x", bounds=(-5, 5), initial=1)
-    u = phase.control("u", bounds=(-2, 2))
-    phase.dynamics(x=-(x**3) + u)
-    narrow.minimize("cost", phase.integral(x**2 + u**2))
-    other = DFET(3, 2).transcribe(narrow)
-    same = other.propagate(other.first_guess(values[None]))[0]
-    assert found.defect == pytest.approx(errors(other, other.unpack(same)).defect, rel=1e-5) and found.defect.max() > 1e-3
-    assert verdict.defect == pytest.approx(assessed(other, same).defect, rel=1e-5)
-    assert found.tail == pytest.approx(errors(other, other.unpack(same)).tail, rel=1e-9)
-    assert state_scales(flight["run"])[0] <= np.ptp(flight["run"].state.on_elements(np.linspace(-1, 1, 999))) * (1 + 1e-9)
-    assert control_scales(flight["run"])[0] == pytest.approx(control_scales(other.unpack(same)["run"])[0])
+    values, found = np.sin(np.arange(9)), []
+    for wide in (1e3, 1.0):
+        problem = Problem("wide")
+        phase = problem.phase("run", t0=0, tf=3)
+        x, u = phase.state("x", bounds=(-5 * wide, 5 * wide), initial=1), phase.control("u", bounds=(-2 * wide, 2 * wide))
+        phase.dynamics(x=-(x**3) + u)
+        problem.minimize("cost", phase.integral(x**2 + u**2))
+        nlp = DFET(3, 2).transcribe(problem)
+        z = nlp.propagate(nlp.first_guess(values[None]))[0]
+        flight = nlp.unpack(z)
+        found.append((errors(nlp, flight), assessed(nlp, z).defect, control_scales(flight["run"])[0]))
+        assert state_scales(flight["run"])[0] <= np.ptp(flight["run"].state.on_elements(np.linspace(-1, 1, 999))) * (1 + 1e-9)
+    (one, defect, unit), (other, same_defect, same_unit) = found
+    assert one.defect == pytest.approx(other.defect, rel=1e-5) and one.defect.max() > 1e-3
+    assert one.tail == pytest.approx(other.tail, rel=1e-9)
+    assert defect == pytest.approx(same_defect, rel=1e-5) and unit == pytest.approx(same_unit)
 
 
 # Orders of controls, and elements that become one

@@ -335,14 +335,15 @@ def test_a_contact_with_a_state_limit_begins_and_ends_where_it_should(wall, word
     assert x is not None
     found, method = followed(problem, parse(word), rounds=1)
     exact = 4 / (9 * wall)
-    # Limits of states give way by a part of the tolerance: the effort is less by 1e-6 of itself.
+    # Limits of states give way by a hundredth of the tolerance, 1e-8 of their scale: the effort is less by 1e-6 of itself, and the state
+    # exceeds its limit by as much when simulated, that of the mesh being put back on it.
     assert abs(found[0][0] - exact) > 1e-5 and found[1][0] == pytest.approx(exact, rel=1.5e-6)
     # The effort depends on the places to the third order.
     edges = np.array(method.settled(found[1][1]).mesh_of("move").edges)
     assert edges[list(method.mesh_of("move").moving)] == pytest.approx([3 * wall, 1 - 3 * wall], abs=2e-3)
     assert not method.mesh_of("move").constant
     simulation = simulate(problem.compile(), found[1][1])
-    assert simulation.max_defect < 1e-7 and simulation.violation < 1e-6
+    assert simulation.max_defect < 1e-8 and simulation.violation < 1e-8
 
 
 def flown(edges, moving, coefficients, places, constant=()):

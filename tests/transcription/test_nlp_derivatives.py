@@ -165,24 +165,6 @@ def test_methods_without_parts_have_derivatives_of_the_whole(method):
     assert np.abs(found - np.hstack(columns)).max() < 1e-6 * max(1.0, np.abs(found).max())
 
 
-def test_pieces_of_rows_give_the_derivatives_of_all(monkeypatch):
-    """Entries, and sums where several pieces have one, of times for instance."""
-    from transcription.nlp import derivatives
-
-    z = ca.SX.sym("z", 40)
-    rows = ca.vertcat(*(ca.sin(z[k] * z[39]) + z[k + 1] ** 2 * z[0] for k in range(38)))
-    weights, more = ca.SX.sym("w", 38), ca.exp(z[3] * z[39])
-    found = []
-    for size in (1000, 7):
-        monkeypatch.setattr(derivatives, "PIECE", size)
-        J, H = derivatives.jacobian(rows, z), derivatives.weighted_hessian(rows, weights, z, more)
-        found.append((J.sparsity(), H.sparsity(), ca.Function("both", [z, weights], [J, H])))
-    assert found[0][:2] == found[1][:2]
-    at = np.linspace(0.1, 1.0, 40), np.linspace(-1.0, 1.0, 38)
-    for whole, pieced in zip(found[0][2](*at), found[1][2](*at), strict=True):
-        assert np.allclose(np.array(whole), np.array(pieced), rtol=1e-14, atol=1e-14)
-
-
 @pytest.fixture
 def little(monkeypatch):
     """As if there were memory for few derivatives only: those of some 20 nodes."""

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from smooth_problems import compass, nlp_of, shuttle, slide, still, two_wells, vector, with_peak
+from smooth_problems import compass, nlp_of, shuttle, slide, two_wells, vector, with_peak
 
 from problems import Problem, load
 from problems.cases.goddard import reference
-from transcription import DFET, NLP, Collocation, MultipleShooting, parse
+from transcription import DFET, NLP, Collocation, MultipleShooting
 from transcription.inner import inner_solver
 from transcription.nlp import scalarized
 from transcription.nlp.program import nlp_scales
@@ -185,49 +185,6 @@ def test_what_is_solved_to_ipopt_but_not_feasible_says_by_how_much(monkeypatch: 
     assert solved.status == "infeasible" and solved.message == "it ended where limits are exceeded by 8.9e-04 of their scales"
 
 
-def well() -> Problem:
-    """One objective, least where a parameter is 1, and 3 there."""
-    problem = still("well")
-    problem.minimize("depth", 3.0 + (problem.parameter("p", bounds=(-2, 2)) - 1.0) ** 2)
-    return problem
-
-
-@pytest.mark.parametrize("make", [well, two_wells])
-@pytest.mark.parametrize("what", ["violation", "excess"])
-@pytest.mark.parametrize(("share", "status"), [(0.9, "converged"), (1.1, "infeasible"), (4.5, "infeasible")])
-def test_what_misses_by_more_than_the_tolerance_has_not_converged(monkeypatch: pytest.MonkeyPatch, make, what, share, status) -> None:
-    """IPOPT itself misses by far less than the tolerance: here, what it reaches is said to miss by about that."""
-    nlp, evaluate = nlp_of(make()), NLP.evaluate
-    m = len(nlp.problem.goals)
-    start = vector(nlp, p=0.2, q=0.1)
-    if what == "excess":
-        monkeypatch.setattr(scalarized._Task, "excess", lambda *_: share * 1e-4)
-    else:
-        monkeypatch.setattr(NLP, "evaluate", lambda self, Z: (evaluate(self, Z)[0], np.full(len(Z), share * 1e-4)))
-    solved = solve(nlp, [0.0] * m, [1.0] * m, start, tolerance=1e-4)
-    assert solved.status == status and close(solved, [3.0] if m == 1 else [0.25, 0.25], 1e-3)
-
-
-@pytest.mark.parametrize(
-    ("reference", "weights", "more"),
-    [
-        ([0, 0], [1, -1], {}),
-        ([0, 0], [0, 0], {}),
-        ([INF, 0], [1, 0], {}),
-        ([0, 0, 0], [1, 1], {}),
-        ([0, np.nan], [1, 1], {}),
-        ([0, -INF], [1, 1], {}),
-        ([0, 0], [1, INF], {}),
-        ([0, 0], [1, 1], {"start": np.zeros(2)}),
-        ([0, 0], [1, 1], {"ceiling": np.zeros(3)}),
-        ([0, 0], [1, 1], {"margin": np.zeros(1000)}),
-    ],
-)
-def test_calls_that_make_no_sense(reference: list[float], weights: list[float], more: dict) -> None:
-    with pytest.raises(ValueError, match="scalarize"):
-        solve(nlp_of(two_wells()), reference, weights, **more)
-
-
 @pytest.mark.slow
 def test_an_objective_is_not_lost_in_the_scale_of_an_explosion_elsewhere():
     """Shooting into states where exp(25 x) grows without limit: the slopes of the cost over the box have a median of 1e100 or more."""
@@ -254,35 +211,29 @@ def test_where_a_peak_is_infinite_no_solve_begins():
     assert solved.status == "failed" and not solved.begun and not solved.clocked
 
 
-def solved(problem: Problem, word: str, **more: int) -> Solved:
-    nlp = parse(word).nlp(problem)
-    middle = np.where(np.isnan(nlp.guess), 0.5 * (nlp.lower + nlp.upper)[nlp.free], nlp.guess)
-    return scalarize(nlp, nlp.first_guess(middle[None])[0], reference=np.zeros(1), weights=np.ones(1), **more)
-
-
-@pytest.mark.parametrize("wide", [1.0, 1e4])
-def test_the_widths_of_bounds_do_not_matter(wide: float) -> None:
-    # x' = u from 0 to 1 with the least integral of x^2 + u^2: its value is coth(1).
+def regulated(wide: float = 1.0, **more: int) -> Solved:
+    """x' = u from 0 to 1 with the least integral of x^2 + u^2: its value is coth(1)."""
     problem = Problem("regulator")
     phase = problem.phase("phase", t0=0, tf=1)
     x, u = phase.state("x", bounds=(-5 * wide, 5 * wide), initial=0, final=1), phase.control("u", bounds=(-10 * wide, 10 * wide))
     phase.dynamics(x=u)
     problem.minimize("effort", phase.integral(x**2 + u**2))
-    found = solved(problem, "dfet:4x5", max_iterations=60)
+    nlp = DFET(4, 5).nlp(problem)
+    return solve(nlp, [0.0], [1.0], nlp.first_guess(np.zeros((1, len(nlp.free))))[0], **more)
+
+
+@pytest.mark.parametrize("wide", [1.0, 1e4])
+def test_the_widths_of_bounds_do_not_matter(wide: float) -> None:
+    found = regulated(wide, max_iterations=60)
     assert found.status == "converged" and abs(found.F[0] - 1 / np.tanh(1)) < 1e-6
 
 
 def test_what_is_solved_to_a_useful_accuracy_has_not_failed(monkeypatch: pytest.MonkeyPatch) -> None:
-    # As above: the last iterations are quick, so that few limits end a solve where it is nearly done.
-    problem = Problem("regulator")
-    phase = problem.phase("phase", t0=0, tf=1)
-    x, u = phase.state("x", bounds=(-5, 5), initial=0, final=1), phase.control("u", bounds=(-10, 10))
-    phase.dynamics(x=u)
-    problem.minimize("effort", phase.integral(x**2 + u**2))
-    failed = solved(problem, "dfet:4x5", max_iterations=4, persistent=False)
+    # The last iterations are quick, so that few limits end a solve where it is nearly done.
+    failed = regulated(max_iterations=4, persistent=False)
     assert failed.status == "failed" and failed.message == "the limit of 4 iterations was reached"
     monkeypatch.setattr(scalarized, "SOLVE", replace(scalarized.SOLVE, useful=1e-2))
-    useful = solved(problem, "dfet:4x5", max_iterations=4, persistent=False)
+    useful = regulated(max_iterations=4, persistent=False)
     assert useful.status == "converged" and "the limit of 4 iterations" in useful.message and "optimality hold to" in useful.message
     assert abs(useful.F[0] - 1 / np.tanh(1)) < 1e-6
-    assert solved(problem, "dfet:4x5", max_iterations=2, persistent=False).status == "failed"
+    assert regulated(max_iterations=2, persistent=False).status == "failed"

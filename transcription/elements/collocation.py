@@ -90,6 +90,7 @@ class Collocation(ElementsMethod):
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = None
 
     word = POINTS
+    options = {"points": POINTS, "control": CONTROLS, "control_order": ()}  # noqa: RUF012 - never changed
     examples = (
         "radau:10x4 (10 intervals of degree 4), gauss:1x40 (one polynomial), lobatto:20x3:1 (controls of order 1), "
         "chebyshev:1x60, radau:20x3:bernstein"
@@ -136,16 +137,6 @@ class Collocation(ElementsMethod):
     def alternatives(self) -> tuple[Collocation, ...]:
         """The other controls; of the full degree; both; a degree more."""
         return self.variants("degree", control=next(one for one in CONTROLS if one != self.control))
-
-    @classmethod
-    def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Collocation:
-        control_order, control = cls.options_of(numbers, options[1:])
-        return cls(numbers[0], numbers[1], points=options[0], control_order=control_order, control=control or "polynomial")
-
-    def to_word(self) -> str:
-        controls = [] if self.control == "polynomial" else [self.control]
-        orders = [] if self.control_order is None else [str(self.control_order)]
-        return ":".join([self.points, f"{self.intervals}x{self.degree}", *controls, *orders])
 
     def degree_of_controls(self, order: int, own: int | None = None) -> int:
         """The degree of controls on a mesh whose own one is `own`, where states have degree `order`: no more than the points determine."""

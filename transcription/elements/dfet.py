@@ -65,6 +65,7 @@ class DFET(ElementsMethod):
     mesh: tuple[tuple[str, PhaseMesh], ...] | Mapping[str, Any] | None = None
 
     word = "dfet"
+    options = {"basis": BASES, "control_order": ()}  # noqa: RUF012 - never changed
     examples = "dfet:4x6 (4 elements of order 6), dfet:4x6:bernstein, dfet:40x2:bernstein:1 (controls of order 1)"
 
     def __post_init__(self) -> None:
@@ -81,15 +82,6 @@ class DFET(ElementsMethod):
     def alternatives(self) -> tuple[DFET, ...]:
         """The other basis; controls of the degree of the states; both; a degree more."""
         return self.variants("order", basis=next(one for one in BASES if one != self.basis))
-
-    @classmethod
-    def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> DFET:
-        control_order, basis = cls.options_of(numbers, options)
-        return cls(numbers[0], numbers[1], control_order=control_order, basis=basis or "lobatto")
-
-    def to_word(self) -> str:
-        options = [*([] if self.basis == "lobatto" else [self.basis]), *([] if self.control_order is None else [str(self.control_order)])]
-        return ":".join([super().to_word(), *options])
 
     def tables(self, order: int, control_order: int) -> Tables:
         return dfet_tables(order, control_order, self.basis)

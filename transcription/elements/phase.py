@@ -285,14 +285,6 @@ class ElementsMethod(Meshed):
         """The degree of controls on a mesh whose own one is `own`, where states have degree `order`."""
         return next((q for q in (own, self.control_order) if q is not None), self.most_control_order(order))
 
-    @classmethod
-    def options_of(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> tuple[int | None, str]:
-        """The degree of the controls, if any, and the other word, or "", among the options of a word with two numbers."""
-        orders, words = [int(one) for one in options if one.isdecimal()], [one for one in options if not one.isdecimal()]
-        if len(numbers) != 2 or len(orders) > 1 or len(words) > 1:
-            raise ValueError(f"write it as {cls.examples}")
-        return orders[0] if orders else None, words[0] if words else ""
-
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`."""
         compiled, tables = problem.compile(), cache(self.tables)

@@ -11,6 +11,7 @@ A density is linear on each of k cells of a phase and may jump between them: `pl
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -141,16 +142,22 @@ def next_method(method: Method, verdict: Verdict, trajectory: Trajectory) -> Met
 
 def redistributed(method: Method, problem: CompiledProblem, trajectory: Trajectory) -> Method:
     """The method with as many elements in each phase, spread by the trajectory's density; moving edges stay."""
-    found = method
+
+    def next_mesh(old: PhaseMesh, phase: PhaseTrajectory, least: float) -> PhaseMesh:
+        places, values = trajectory_density(phase)
+        edges = equidistributed(places, raised(places, values, least), old.elements)
+        return old if old.moving else PhaseMesh(tuple(edges.tolist()), old.order, old.control_order)
+
+    return by_density(method, problem, trajectory, next_mesh)
+
+
+def by_density(
+    method: Method, problem: CompiledProblem, trajectory: Trajectory, next_mesh: Callable[[PhaseMesh, PhaseTrajectory, float], PhaseMesh]
+) -> Method:
+    """The method on the next mesh of each phase that has a duration, with the least floor of the density that suits the problem."""
+    old = {name: method.mesh_of(name) for name, phase in trajectory.items() if phase.tf > phase.t0}
     for least in DENSITY_FLOORS:
-        meshes = {}
-        for name, phase in trajectory.items():
-            old = method.mesh_of(name)
-            if phase.tf > phase.t0 and not old.moving:
-                places, values = trajectory_density(phase)
-                edges = equidistributed(places, raised(places, values, least), old.elements)
-                meshes[name] = PhaseMesh(tuple(edges.tolist()), old.order, old.control_order)
-        found = method.remeshed(meshes)
+        found = method.remeshed({name: next_mesh(mesh, trajectory[name], least) for name, mesh in old.items()})
         if found.suits(problem):
             break
     return found
@@ -172,22 +179,6 @@ def next_intervals(
     density = np.maximum(curved, (needed * old.elements / (len(places) - 1))[:, None])
     count = max(count, min(most, int(np.ceil(integrals(places, density)[-1] - 1e-9))))
     return PhaseMesh(tuple(equidistributed(places, density, count).tolist()), old.order)
-
-
-def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
-    """The method with elements cut where other controls would gain: at the jumps of these, else in the middle; no edge moves."""
-    finer = {}
-    most = max((float(gain.amounts.max()) for gain in verdict.gains.values()), default=0.0)
-    for name, gain in verdict.gains.items():
-        old = method.mesh_of(name).found_in(trajectory[name].state.edges)
-        worst_first = [int(j) for j in np.argsort(-gain.amounts, kind="stable") if gain.amounts[j] >= REFINEMENT.worst_share * most > 0]
-        # Elements that are integrated in several steps are judged by these.
-        if worst_first and len(gain.amounts) == old.elements:
-            # Switches that are found leave fewer.
-            limit = 2 * max(method.most_elements, 2 * method.elements)
-            edges = split(np.array(old.edges), {j: gain.places[j].tolist() or [0.0] for j in worst_first}, limit)
-            finer[name] = PhaseMesh(tuple(edges.tolist()), old.order, old.control_order)
-    return method.remeshed(finer)
 
 
 def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: PhaseErrors, scores: ElementScores) -> PhaseMesh:

@@ -1,11 +1,7 @@
-"""Sparse derivatives of NLPs: assembled from derivatives at points if an NLP has such parts, else from one long list of operations.
-
-Derivatives of many rows are built in pieces of some hundreds of rows, so that the work can end early between the pieces.
-"""
+"""Sparse derivatives of NLPs: assembled from derivatives at points if an NLP has such parts, else from one long list of operations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import casadi as ca
@@ -14,13 +10,10 @@ import numpy as np
 from problems.compiled import remembered
 
 from ..base import NLP
-from ..stopping import check_stopping
 from .from_points import FromPoints, kind_of
 
 MOST_GIGABYTES = 2.0
 """Most memory that the derivatives of one NLP may take."""
-PIECE = 500
-"""Rows of one piece. Their derivatives take less than a second, whereas those of all rows of a fine mesh take many."""
 
 
 @remembered
@@ -63,11 +56,11 @@ def hessian(nlp: NLP) -> ca.Function:
     whole, sizes = _from_points(nlp), {"of_F": len(nlp.problem.goals), "of_g": len(nlp.g_scale)}
     if whole is not None:
         z, (of_F, of_g) = whole.z, (ca.MX.sym(name, size) for name, size in sizes.items())
-        H = whole.hessian(of_F, of_g)
+        H: Any = whole.hessian(of_F, of_g)
     else:
         z, of_F, of_g = (_symbol(nlp, name, size) for name, size in {"z": len(nlp.variables), **sizes}.items())
         F, g = nlp.functions(z)
-        H = weighted_hessian(g, of_g, z, ca.dot(of_F, F))
+        H = ca.triu(ca.hessian(ca.dot(of_F, F) + ca.dot(of_g, g), z)[0])
     return ca.Function("hessian", [z, of_F, of_g], [H], ["z", *sizes], ["H"])
 
 
@@ -85,54 +78,10 @@ def _jacobian(rows: Any, z: Any) -> Any:
     counts = np.diff(ca.jacobian_sparsity(rows, z).T.colind())
     dense = np.flatnonzero(counts > 0.25 * max(z.numel(), 1))
     if not len(dense) or len(dense) == len(counts):
-        return jacobian(rows, z)
-    sparse = np.setdiff1d(np.arange(len(counts)), dense)
-    blocks = ca.vertcat(*(jacobian(rows[which.tolist()], z) for which in (sparse, dense)))
-    return blocks[np.argsort(np.concatenate([sparse, dense])).tolist(), :]
-
-
-def jacobian(rows: Any, z: Any) -> Any:
-    """The Jacobian of rows (r,) with respect to z, sparse. Raises `Stopped` if the work is to end early."""
-    if not _several(rows):
         return ca.jacobian(rows, z)
-    found = []
-    for first, last, used in _pieces(rows, z):
-        part = ca.jacobian(rows[first:last], z[used])
-        part.enlarge(last - first, z.numel(), list(range(last - first)), used)
-        found.append(part)
-    return ca.vertcat(*found)
-
-
-def weighted_hessian(rows: Any, weights: Any, z: Any, more: Any) -> Any:
-    """The upper triangle of the Hessian of `more` + weights'rows with respect to z, sparse. Raises `Stopped` as `jacobian` does."""
-    if not _several(rows):
-        return ca.triu(ca.hessian(more + ca.dot(weights, rows), z)[0])
-    total = ca.SX(z.numel(), z.numel())
-    for first, last, used in _pieces(rows, z):
-        lagrangian = ca.dot(weights[first:last], rows[first:last])
-        if not first:
-            lagrangian, used = more + lagrangian, sorted({*used, *ca.jacobian_sparsity(more, z).get_triplet()[1]})
-        part = ca.triu(ca.hessian(lagrangian, z[used])[0])
-        part.enlarge(z.numel(), z.numel(), used, used)
-        total += part
-    return total
-
-
-def _several(rows: Any) -> bool:
-    """Whether rows are differentiated in pieces. Rows without scalar operations are one piece, since each piece would have all
-    operations."""
-    return rows.numel() > PIECE and isinstance(rows, ca.SX)
-
-
-def _pieces(rows: Any, z: Any) -> Iterator[tuple[int, int, list[int]]]:
-    """The row ranges of the pieces, and the entries of z on which each depends: derivatives by all of z would take time in proportion to z
-    for each piece."""
-    by_row, count = ca.jacobian_sparsity(rows, z).T, rows.numel()
-    starts, columns = np.array(by_row.colind()), np.array(by_row.row(), dtype=int)
-    for first in range(0, count, PIECE):
-        check_stopping()
-        last = min(first + PIECE, count)
-        yield first, last, np.unique(columns[starts[first] : starts[last]]).tolist()
+    sparse = np.setdiff1d(np.arange(len(counts)), dense)
+    blocks = ca.vertcat(*(ca.jacobian(rows[which.tolist()], z) for which in (sparse, dense)))
+    return blocks[np.argsort(np.concatenate([sparse, dense])).tolist(), :]
 
 
 def too_dense(nlp: NLP) -> bool:

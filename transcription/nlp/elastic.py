@@ -17,12 +17,12 @@ import numpy as np
 from problems.compiled import remembered
 from problems.sampling import refuse_peaks
 
-from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
+from ..base import CONVERGED, FAILED, INFEASIBLE, NLP
 from ..phases.writer import DYNAMICS
 from ..stopping import Stopped, check_stopping, stopping
 from .derivatives import gradients, hessian
-from .program import STATUS_OF_IPOPT, Watched, back_in_bounds, derivatives_of_program, ipopt_options, multiplied, origin, scaled_bounds
-from .scalarized import SOLVE, SOLVED, Solved, not_begun
+from .program import Watched, back_in_bounds, derivatives_of_program, ipopt_options, multiplied, origin, scaled_bounds
+from .scalarized import SOLVE, Solved, ended, not_begun
 
 
 def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max_iterations: int = 300, seconds: float = 600.0) -> Solved:
@@ -49,24 +49,14 @@ def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max
         lbg=limits[0],
         ubg=limits[1],
     )
-    stats = run.stats()
-    outcome, iterations = stats["return_status"], int(np.clip(stats["iter_count"], 0, max_iterations))
     z = origin(nlp) + np.array(answer["x"]).ravel()[: len(start)] * nlp.scale
-    z = nlp.tighten(back_in_bounds(nlp, z)[None])[0]
-    F, violation = nlp.evaluate(z[None])
-    status = STATUS_OF_IPOPT.get(outcome, FAILED)
-    if not np.isfinite([*F[0], violation[0]]).all():
-        z, status = start, FAILED
-        F, violation = nlp.evaluate(z[None])
-    elif violation[0] <= tolerance:
-        status = CONVERGED
-    elif outcome in SOLVED:
-        status = INFEASIBLE
-    message = "" if status == CONVERGED else "the violation can get no smaller nearby" if status == INFEASIBLE else outcome
+    solved, done = ended(nlp, run, z, start, max_iterations)
+    if solved.violation <= tolerance:
+        solved = replace(solved, status=CONVERGED, message="")
+    elif done:
+        solved = replace(solved, status=INFEASIBLE, message="the violation can get no smaller nearby")
     # Of the sum of what rows miss, in their weights.
-    multipliers = np.concatenate([np.zeros(len(F[0])), np.array(answer["lam_g"]).ravel() * weights / nlp.g_scale])
-    message = message.replace("_", " ").lower()
-    return Solved(z, F[0], float(violation[0]), status, iterations, status == TIMEOUT, message=message, multipliers=multipliers)
+    return replace(solved, multipliers=np.concatenate([0.0 * solved.F, np.array(answer["lam_g"]).ravel() * weights / nlp.g_scale]))
 
 
 def opposing(nlp: NLP, z: np.ndarray) -> tuple[str, ...]:

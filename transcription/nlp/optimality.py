@@ -1,4 +1,4 @@
-"""Residual of the first-order conditions of Pareto optimality at a feasible vector, and the multipliers that minimise it."""
+"""Residual of the first-order conditions of Pareto optimality at a feasible vector, the multipliers that minimise it, and its costates."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from scipy.linalg import lstsq
 from scipy.optimize import nnls
 from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack, identity, vstack
 from scipy.sparse.linalg import SuperLU, splu
 
+from problems.compiled import CompiledProblem, remembered
+
 from ..base import NLP
+from ..trajectories.costates import Costates, PhaseCostates
 from .derivatives import gradients
 from .program import nlp_scales
 
@@ -322,3 +326,45 @@ def _largest(good: Callable[[float], bool], ratio: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if good(middle) else (low, middle)
     return low
+
+
+@remembered
+def _slopes(problem: CompiledProblem) -> ca.Function:
+    """(q of each phase, parameters, multipliers of objectives and of constraints) -> gradient of their sum by each q."""
+    inputs = problem.objectives.mx_in()
+    of_objectives, of_constraints = ca.MX.sym("f", len(problem.goals)), ca.MX.sym("c", len(problem.limits))
+    total = ca.dot(problem.objectives(*inputs), of_objectives) + ca.dot(problem.constraints(*inputs), of_constraints)
+    outputs = [ca.densify(ca.gradient(total, q)) for q in inputs[:-1]]
+    return ca.Function("slopes", [*inputs, of_objectives, of_constraints], outputs)
+
+
+def costates(nlp: NLP, z: np.ndarray, found: Multipliers) -> Costates | None:
+    """The costates of an optimal vector (n,), and the Hamiltonian, from its multipliers; None if they are not finite.
+
+    They belong to the weighted sum of the objectives, all minimised, that the vector minimises: the weights are the multipliers of the
+    objectives over their sum, so that they are of the objectives' own units. A costate is the derivative of that sum by the state, and H =
+    costates' rates + weighted integrands, per unit of the phase's time.
+    """
+    z = np.asarray(z, dtype=float)
+    problem, trajectory, total = nlp.problem, nlp.unpack(z), found.of_objectives.sum()
+    of_objectives, of_rows, of_bounds = (one / total for one in (found.of_objectives, found.of_rows, found.of_bounds))
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    quantities = [np.array(q).ravel() for q in nlp.quantities.call([z])]
+    of_constraints = of_rows[len(of_rows) - len(problem.limits) :]
+    slopes = _slopes(problem).call([*quantities, parameters, of_objectives, of_constraints])
+    # What a unit of each integral counts.
+    weights = {
+        phase.name: np.array(slope).ravel()[2 + phase.initials.size1_out(0) + phase.finals.size1_out(0) :][: phase.integrands.size1_out(0)]
+        for phase, slope in zip(problem.phases, slopes, strict=True)
+    }
+    adjoints, phases = nlp.adjoint(z, of_rows, of_bounds, weights), {}
+    for phase in problem.phases:
+        name, flown, adjoint = phase.name, trajectory[phase.name], adjoints[phase.name]
+        values = adjoint.costates(flown.time)
+        inputs = flown.states.T, flown.controls.T, flown.time[None], np.array([flown.t0, flown.tf, *parameters])
+        rates, integrands = (np.array(function(*inputs)).reshape(-1, len(flown.time)) for function in (phase.dynamics, phase.integrands))
+        H = np.einsum("ki,ik->k", values, rates) + weights[name] @ integrands
+        if not (np.isfinite(values).all() and np.isfinite(H).all()):
+            return None
+        phases[name] = PhaseCostates(tuple(v.name for v in phase.states), values, H, adjoint.costates, adjoint.error)
+    return Costates(of_objectives, phases)

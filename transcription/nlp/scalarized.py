@@ -17,7 +17,18 @@ import numpy as np
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import Stopped, stopping
 from .optimality import optimality
-from .program import STATUS_OF_IPOPT, Options, back_in_bounds, equilibrated, gradients, nlp_scales, origin, program_parameters, solver
+from .program import (
+    STATUS_OF_IPOPT,
+    Options,
+    Watched,
+    back_in_bounds,
+    equilibrated,
+    gradients,
+    nlp_scales,
+    origin,
+    program_parameters,
+    solver,
+)
 
 AT_LIMIT = "maximum iterations exceeded"
 IN_BOX = "it stopped at ends of the boxes around where it began"
@@ -165,7 +176,7 @@ def scalarize(
     near: bool = False,
 ) -> Solved:
     """Descend from a start (n,) to the front: least alpha with F - reference <= alpha weights (m,); ceiling (m,), margin (r,)."""
-    start = back_in_bounds(nlp, np.asarray(start, dtype=float)) if np.shape(start) == nlp.lower.shape else start
+    start = back_in_bounds(nlp, start)
     if stopping():
         return not_begun(nlp, start)
     try:
@@ -230,22 +241,10 @@ def not_begun(nlp: NLP, start: np.ndarray) -> Solved:
 def _task(
     nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None, margin: np.ndarray | None
 ) -> _Task:
-    n, m, r = len(nlp.variables), len(nlp.problem.goals), len(nlp.g_scale)
-    limits = np.full(m, np.inf) if ceiling is None else np.asarray(ceiling, dtype=float)
-    inside = np.zeros(r) if margin is None else np.asarray(margin, dtype=float)
-    reference, weights = np.asarray(reference, dtype=float), np.asarray(weights, dtype=float)
-    given = (("start", start, n), ("reference", reference, m), ("weights", weights, m), ("ceiling", limits, m), ("margin", inside, r))
-    for name, value, size in given:
-        if np.shape(value) != (size,) or np.isnan(value).any():
-            raise ValueError(f"scalarize: {name} must be {size} numbers, not {value!r}")
-    if not (inside >= 0).all():
-        raise ValueError(f"scalarize: margin must not be negative, not {inside.min():g}")
+    limits = np.full(len(reference), np.inf) if ceiling is None else ceiling
+    inside = np.zeros(len(nlp.g_scale)) if margin is None else margin
     used = reference < np.inf
     moving = used & (weights > 0)
-    if not (np.isfinite(weights) & (weights >= 0)).all() or not moving.any() or not np.isfinite(reference[used]).all():
-        raise ValueError(
-            f"scalarize: weights must not be negative, and one with a finite reference positive, not {weights} for {reference}"
-        )
     F = nlp.evaluate(start[None])[0][0]
     F = np.where(np.isfinite(F), F, np.where(used, reference, 0.0))
     # alpha is measured from the start's, in the scales of the objectives: digits are kept wherever the reference is.
@@ -299,30 +298,32 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
         lbg=np.concatenate([(task.lower - ways) * to_rows, none]),
         ubg=np.concatenate([(task.upper + ways) * to_rows, np.where(task.used, 0.0, np.inf), task.top]),
     )
-    stats = run.stats()
-    outcome = stats["return_status"]
-    # Where IPOPT does not begin, nothing is written there.
-    iterations = int(stats["iter_count"]) if 0 <= stats["iter_count"] <= settings.max_iterations else 0
     z = zero + np.array(answer["x"]).ravel()[:-1] * columns
     # An end of the box that is nearer than a hundredth of its width is what stopped a variable.
     stuck = bool((made_up & (np.stack([z - lower, upper - z]) < 0.01 * np.where(made_up, upper - lower, 0.0))).any())
+    solved, done = ended(nlp, run, z, start, settings.max_iterations)
+    if done:
+        missed = max(solved.violation, task.excess(solved.F))
+        message = f"it ended where limits are exceeded by {missed:.1e} of their scales" if missed > tolerance else ""
+        solved = replace(solved, status=INFEASIBLE if message else CONVERGED, message=message)
+    of_rows, moving, resting = np.split(np.array(answer["lam_g"]).ravel(), np.cumsum([len(rows), len(task.scale)]))
+    return replace(solved, multipliers=np.concatenate([(moving + resting) / task.scale, of_rows / rows])), stuck
+
+
+def ended(nlp: NLP, run: Watched, z: np.ndarray, start: np.ndarray, max_iterations: int) -> tuple[Solved, bool]:
+    """What a run of IPOPT left at z (n,), or the start where that is no number; and whether it solved its program."""
+    stats = run.stats()
+    outcome = stats["return_status"]
+    # Where IPOPT does not begin, nothing is written there.
+    iterations = int(stats["iter_count"]) if 0 <= stats["iter_count"] <= max_iterations else 0
+    status, message, done = STATUS_OF_IPOPT.get(outcome, FAILED), outcome.replace("_", " ").lower(), outcome in SOLVED
     z = nlp.tighten(back_in_bounds(nlp, z)[None])[0]
     F, violation = nlp.evaluate(z[None])
-    status = STATUS_OF_IPOPT.get(outcome, FAILED)
-    if not (np.isfinite(F).all() and np.isfinite(violation[0])):
-        z, status = start, FAILED
+    clocked = status == TIMEOUT
+    if not np.isfinite([*F[0], violation[0]]).all():
+        z, status, message, done = start, FAILED, "it ended at no numbers" if done else message, False
         F, violation = nlp.evaluate(z[None])
-    elif outcome in SOLVED:
-        status = CONVERGED if violation[0] <= tolerance and task.excess(F[0]) <= tolerance else INFEASIBLE
-    message = "" if status == CONVERGED else outcome.replace("_", " ").lower()
-    if outcome in SOLVED and status == FAILED:
-        message = "it ended at no numbers"
-    elif outcome in SOLVED and status == INFEASIBLE:
-        message = f"it ended where limits are exceeded by {max(violation[0], task.excess(F[0])):.1e} of their scales"
-    clocked = STATUS_OF_IPOPT.get(outcome) == TIMEOUT
-    of_rows, moving, resting = np.split(np.array(answer["lam_g"]).ravel(), np.cumsum([len(rows), len(task.scale)]))
-    multipliers = np.concatenate([(moving + resting) / task.scale, of_rows / rows])
-    return Solved(z, F[0], float(violation[0]), status, iterations, clocked, message=message, multipliers=multipliers), stuck
+    return Solved(z, F[0], float(violation[0]), status, iterations, clocked, message=message), done
 
 
 def _box(nlp: NLP, z: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

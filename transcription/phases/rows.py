@@ -88,22 +88,26 @@ class Rows:
     that word."""
 
     def add(
-        self, expression: ca.MX, lower: object, upper: object, scale: object, labels: str | Sequence[str], *, propagated: bool = False
+        self,
+        expression: ca.MX,
+        lower: object,
+        upper: object,
+        scale: object,
+        labels: str | Sequence[str],
+        *,
+        propagated: bool = False,
+        of: tuple[str, str] | None = None,
     ) -> None:
-        """A matrix of rows, column by column; limits, scale, label for each or all; `propagated`: satisfied by propagation."""
+        """A matrix of rows, column by column; limits, scale, label for each or all; `propagated`: satisfied by propagation; `of`: they are
+        samples of one quantity of a phase, so that their multipliers are found again, see `samples`."""
         count = expression.numel()
+        if of is not None:
+            self.samples.setdefault(of, []).append(slice(self.count, self.count + count))
         self.expressions.append(ca.vec(expression))
         for target, value in ((self.lower, lower), (self.upper, upper), (self.scale, scale)):
             target.append(np.broadcast_to(np.asarray(value, dtype=float), count))
         self.propagated.append(propagated)
         self.labels.extend([labels] * count if isinstance(labels, str) else labels)
-
-    def add_samples(
-        self, phase: str, kind: str, expression: ca.MX, lower: object, upper: object, scale: object, label: str, *, propagated: bool = False
-    ) -> None:
-        """Rows that are samples of one quantity of a phase, so that their multipliers are found again; see `add` and `samples`."""
-        self.samples.setdefault((phase, kind), []).append(slice(self.count, self.count + expression.numel()))
-        self.add(expression, lower, upper, scale, label, propagated=propagated)
 
     def at_points(self, function: ca.Function, *inputs: ca.MX) -> list[ca.MX]:
         """The outputs of a Function of columns at k points, side by side: matrices (size of the output, k) of inputs (size, k)."""

@@ -191,7 +191,7 @@ class PhaseWriter(ABC):
         """Add the path constraints, of which `values` (npath, k) are samples; or one row of samples for each, of any lengths."""
         for limit, samples in zip(self.phase.paths, ca.vertsplit(values) if isinstance(values, ca.MX) else values, strict=True):
             label = f"path '{limit.name}' of '{self.phase.name}'"
-            rows.add_samples(self.phase.name, "path", samples, limit.lower, limit.upper, limit.scale, label)
+            rows.add(samples, limit.lower, limit.upper, limit.scale, label, of=(self.phase.name, "path"))
 
     def add_sizes(self, rows: Rows, sizes: ca.MX, S: ca.MX, scales: Sequence[float]) -> None:
         """Add the rows that keep the variables S (n, k), of these scales (n,), from being less than the absolute values of sizes (n, k)."""

@@ -20,11 +20,11 @@ from problems.problem import Problem
 from ..assembly import Assembly
 from ..base import NLP, Transcription
 from ..meshed import Meshed
-from ..meshes.refinement import DENSITY_FLOORS, next_intervals
+from ..meshes.refinement import by_density, next_intervals
 from ..phases.layout import Layout
 from ..phases.mesh import PhaseMesh
 from ..phases.rows import EndSlots
-from ..trajectories.trajectory import Trajectory
+from ..trajectories.trajectory import PhaseTrajectory, Trajectory
 from .control_law import DEGREES, ControlLaw
 from .phase import ShootingPhase
 from .runge_kutta import TABLEAUX, check_steps
@@ -64,6 +64,8 @@ class Shooting(Transcription):
     control_nodes: int | None = None
     path_points: int = 0
 
+    further = ("steps",)
+    options = {"control": tuple(DEGREES), "control_nodes": (), "scheme": tuple(TABLEAUX)}  # noqa: RUF012 - never changed
     _counted: ClassVar[tuple[str, int]]
     """The setting from which the number of intervals follows, and its least value, which makes one."""
     _apart: ClassVar[bool]
@@ -78,38 +80,13 @@ class Shooting(Transcription):
         check_choice(f"{name}: scheme", self.scheme, TABLEAUX)
         check_choice(f"{name}: control", self.control, DEGREES)
 
-    @property
-    def _intervals(self) -> int:
-        """Number of intervals between nodes."""
-        setting, least = self._counted
-        return int(getattr(self, setting)) - least + 1
-
-    @classmethod
-    def from_word(cls, numbers: tuple[int, ...], options: tuple[str, ...]) -> Transcription:
-        """Options are, in any order, a kind of control, its number of nodes, and a scheme."""
-        if not 1 <= len(numbers) <= 2:
-            raise ValueError(f"write it as {cls.examples}")
-        settings: dict[str, Any] = dict(zip((cls._counted[0], "steps"), numbers, strict=False))
-        for option in options:
-            name = "control" if option in DEGREES else "scheme" if option in TABLEAUX else "control_nodes" if option.isdecimal() else ""
-            if not name or name in settings:
-                known = f"{', '.join(DEGREES)}; {', '.join(TABLEAUX)}; or a number of nodes of the controls"
-                raise ValueError(f"'{option}' is given twice or unknown; there are {known}")
-            settings[name] = int(option) if name == "control_nodes" else option
-        return cls(**settings)
-
-    def to_word(self) -> str:
-        steps = f"x{self.steps}" if self.steps > 1 else ""
-        defaults = (self.control, "constant"), (self.control_nodes, None), (self.scheme, "rk4")
-        return ":".join([super().to_word() + steps, *(str(value) for value, default in defaults if value != default)])
-
     def transcribe(self, problem: Problem | CompiledProblem) -> NLP:
         """Write `problem` as an NLP; see `Transcription.transcribe`. Raises ValueError, too, where steps are too long to be stable."""
         compiled = problem.compile()
         self._check_steps(compiled)
 
         def writer(phase: CompiledPhase, layout: Layout, ends: EndSlots) -> ShootingPhase:
-            mesh, points = self._phase_mesh(phase.name), [i / (self.path_points + 1) for i in range(self.path_points + 1)]
+            mesh, points = self.mesh_of(phase.name), [i / (self.path_points + 1) for i in range(self.path_points + 1)]
             law = self._law(mesh)
             if law.jumps and _sees_controls(phase):
                 points.append(1.0)
@@ -120,20 +97,16 @@ class Shooting(Transcription):
 
     def _check_steps(self, problem: CompiledProblem) -> None:
         """Raise ValueError where steps are too long to be stable."""
-        meshes, (count, _) = {phase.name: self._phase_mesh(phase.name) for phase in problem.phases}, self._counted
+        meshes, (count, _) = {phase.name: self.mesh_of(phase.name) for phase in problem.phases}, self._counted
         places = {name: self._steps(mesh).places for name, mesh in meshes.items()}
-        own = [name for name, mesh in meshes.items() if mesh != self._equal]
+        own = [name for name, mesh in meshes.items() if mesh != Shooting.mesh_of(self, name)]
         settings = {count: getattr(self, count), "steps": self.steps}
-        check_steps(problem, TABLEAUX[self.scheme], places, f"{type(self).__name__}: ", settings, own)
+        check_steps(problem, TABLEAUX[self.scheme], places, type(self).__name__, settings, own)
 
-    def _phase_mesh(self, phase: str) -> PhaseMesh:
-        """The intervals of a phase, by its name."""
-        return self._equal
-
-    @property
-    def _equal(self) -> PhaseMesh:
-        """Equal intervals."""
-        return PhaseMesh.uniform(self._intervals, TABLEAUX[self.scheme].order)
+    def mesh_of(self, phase: str) -> PhaseMesh:
+        """The intervals of a phase, by its name: equal ones."""
+        setting, least = self._counted
+        return PhaseMesh.uniform(getattr(self, setting) - least + 1, TABLEAUX[self.scheme].order)
 
     def _law(self, mesh: PhaseMesh) -> ControlLaw:
         """Controls on nodes that lie among these intervals as equally spaced ones do among equal intervals."""
@@ -253,18 +226,11 @@ class MultipleShooting(Meshed, Shooting):
     ) -> MultipleShooting:
         """Intervals by the density of the trajectory, more even where their steps would be too long to be stable."""
         degree, most = DEGREES[self.control], max(self.most_elements, 2 * self.elements)
-        found = self
-        for least in DENSITY_FLOORS:
-            found = self.remeshed(
-                {
-                    name: next_intervals(self.mesh_of(name), phase, errors[name], of_controls[name], degree, least, most)
-                    for name, phase in trajectory.items()
-                    if phase.tf > phase.t0
-                }
-            )
-            if found.suits(problem):
-                break
-        return found
+
+        def next_mesh(old: PhaseMesh, phase: PhaseTrajectory, least: float) -> PhaseMesh:
+            return next_intervals(old, phase, errors[phase.name], of_controls[phase.name], degree, least, most)
+
+        return by_density(self, problem, trajectory, next_mesh)
 
     def suits(self, problem: CompiledProblem) -> bool:
         """Whether all steps may be stable."""
@@ -278,9 +244,6 @@ class MultipleShooting(Meshed, Shooting):
         """As many equal intervals."""
         equal = {name: PhaseMesh.uniform(mesh.elements, mesh.order) for name, mesh in self.meshes.items()}
         return () if equal == self.meshes else (self.remeshed(equal),)
-
-    def _phase_mesh(self, phase: str) -> PhaseMesh:
-        return self.mesh_of(phase)
 
 
 def _sees_controls(phase: CompiledPhase) -> bool:

@@ -70,7 +70,7 @@ class ShootingPhase(PhaseWriter):
         self.add_dynamics(rows, pick(extended, self.R) - pick(extended, self._arrivals))
         at_nodes = pick(extended, self.Y)
         for i, v in enumerate(phase.states if len(self.Y) else ()):
-            rows.add_samples(phase.name, "state", at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}")
+            rows.add(at_nodes[i, :], v.lower, v.upper, v.scale, f"bounds of {phase.name}.{v.name}", of=(phase.name, "state"))
         seen = pick(extended, self.W)
         self.add_paths(rows, seen[: len(phase.paths), :])
         first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
@@ -180,12 +180,10 @@ class ShootingPhase(PhaseWriter):
     def _linearised(self) -> ca.Function:
         """Extended vector -> derivatives (results, N inputs) of all steps, and (rows, inputs) of samples at their end."""
         extended, n = ca.MX.sym("extended", self.layout.total), self.mesh.steps
-        inputs, left = self._inputs(extended), self.layout.pick(extended, self.B[:-1])
-        shots = [states for states, *_ in self._propagated_shots(extended)]
-        before = ca.horzcat(*(part for j, states in enumerate(shots) for part in (left[:, j], states[:, :-1])))
+        before, last, inputs = self._at_steps(extended)
         D, at_end = self.step.gradient(samples=True).map(n)(before, *inputs), ca.MX(0, self.step.inputs)
         if len(self.W) > n * len(self.step.points):
-            at_end = self.step.end_gradient(shots[-1][:, -1], *self._inputs(extended, n - 1))
+            at_end = self.step.end_gradient(last, *self._inputs(extended, n - 1))
         return ca.Function("linearised", [extended], [ca.densify(D), ca.densify(at_end)])
 
     @property
@@ -197,11 +195,16 @@ class ShootingPhase(PhaseWriter):
     def _on_steps(self) -> Batched:
         """Extended vectors -> coefficients of controls (N, degree + 1, nu) and states (N, order + 1, nx) on steps, both flat."""
         extended = ca.MX.sym("extended", self.layout.total)
-        inputs, left = self._inputs(extended), self.layout.pick(extended, self.B[:-1])
-        before = [part for j, (states, *_) in enumerate(self._propagated_shots(extended)) for part in (left[:, j], states[:, :-1])]
+        before, _, inputs = self._at_steps(extended)
         places = 0.5 * (1.0 + lobatto_nodes(self.step.scheme.order + 1))
-        states = self.step.inside(places).map(self.mesh.steps)(ca.horzcat(*before), *inputs)
+        states = self.step.inside(places).map(self.mesh.steps)(before, *inputs)
         return Batched(ca.Function("unpacked", [extended], [ca.densify(inputs[0]), ca.densify(states)]), compiled=self.compilable)
+
+    def _at_steps(self, extended: ca.MX) -> tuple[ca.MX, ca.MX, tuple[ca.MX, ...]]:
+        """States (nx, N) before all steps, those after the last one, and the other inputs."""
+        left, shots = self.layout.pick(extended, self.B[:-1]), [states for states, *_ in self._propagated_shots(extended)]
+        before = ca.horzcat(*(part for j, states in enumerate(shots) for part in (left[:, j], states[:, :-1])))
+        return before, shots[-1][:, -1], self._inputs(extended)
 
     def _inputs(self, extended: ca.MX, first: int = 0, last: int | None = None) -> tuple[ca.MX, ...]:
         """The other inputs of the steps, or of some of them, side by side: coefficients of the controls, starts, lengths, and s."""

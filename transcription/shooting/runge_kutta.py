@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from math import ceil, log, sqrt
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem
 
+from ..phases.adjoint import slopes
 from ..phases.writer import state_along
 
 UNSTABLE_GROWTH = log(1e3)
 """A mode that decays by this much really, and grows by this much in computation, is unstable."""
-PLACES_OF_MODES = np.linspace(0.0, 1.0, 5)
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ def check_steps(
     problem: CompiledProblem,
     scheme: Tableau,
     places: Mapping[str, np.ndarray],
-    prefix: str,
+    method: str,
     settings: Mapping[str, int],
     own: Collection[str] = (),
 ) -> None:
@@ -124,69 +123,51 @@ def check_steps(
 
     An explicit method multiplies a decaying mode of rate lambda by R(h lambda) with each step: where that is more than 1, what should
     vanish grows. Before any work only the dynamics within the bounds are known, so that only what is certain is refused: a mode that
-    decays during the shortest phase there may be, and grows by a lot in these steps, at each of several points, from the initial to the
-    final or guessed states, under low, middle and high controls.
+    decays during the shortest phase there may be, and grows by a lot in these steps, at each of several points. `settings`: the number of
+    intervals, or nodes, and of steps; the intervals of phases that are `own` do not follow from the former.
     """
-    p = np.array([problem.guesses.get(v.name, 0.5 * (v.lower + v.upper)) for v in problem.parameters])
     for phase in problem.phases:
-        shares = np.diff(places[phase.name])
-        n, widest = len(shares), float(shares.max())
-        length = max(phase.duration[0], phase.tf.lower - phase.t0.upper)
-        modes = _modes(phase, length, p, middle=phase.name in own) if length > 0 else []
-        growing = [_growing(scheme, rates * length, shares) for rates, _ in modes]
-        if not modes or not all(found.any() for found in growing):
+        shares, length = np.diff(places[phase.name]), max(phase.duration[0], phase.tf.lower - phase.t0.upper)
+        found = _growing(problem, phase, scheme, length * shares, phase.name in own) if length > 0 else None
+        if found is None:
             continue
-        (rates, names), found = modes[0], np.flatnonzero(growing[0])
-        factors = np.abs(scheme.stability(rates[found] * length * widest))
-        worst, h = found[np.argmax(factors)], length * widest
+        (rate, name), h = found, length * float(shares.max())
         finer = np.geomspace(1.0, 1e4, 5000)
-        enough = finer[np.abs(scheme.stability(rates[worst] * h / finer)) <= 1.0]
+        enough = finer[np.abs(scheme.stability(rate * h / finer)) <= 1.0]
         (count, value), (_, steps) = settings.items()
         cure = "far shorter ones"
         if len(enough):
             more = "" if phase.name in own else f"{count}={ceil(value * enough[0]) + 1} or more, or "
             cure = f"{more}steps={ceil(steps * enough[0])}"
-        such = ("the longest step", f"there are {n} in all") if phase.name in own else ("each step", f"there are {n}")
+        factor = float(np.abs(scheme.stability(np.array(rate * h))))
         raise ValueError(
-            f"{prefix}phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{names[worst]}', which decays at a rate "
-            f"of {-rates[worst].real:.3g} per {phase.time_unit}: {such[0]} of {scheme.name} multiplies it by {factors.max():.3g}, and "
-            f"{such[1]}; take {cure}"
+            f"{method}: phase '{phase.name}': steps of {h:.4g} {phase.time_unit} are too long for '{name}', which decays at a rate of "
+            f"{-rate.real:.3g} per {phase.time_unit}: {scheme.name} multiplies it by {factor:.3g} in each; take {cure}"
         )
 
 
-def _growing(scheme: Tableau, decay: np.ndarray, shares: np.ndarray) -> np.ndarray:
-    """Which modes, of rates `decay` per phase, should vanish and grow over some consecutive steps of these `shares` (N,)."""
-    lengths, place = np.unique(shares, return_inverse=True)
-    growth = np.log(np.maximum(np.abs(scheme.stability(np.multiply.outer(lengths, decay))), 1e-300))[place]
-    sums = np.cumsum(np.vstack([np.zeros(len(decay)), growth]), axis=0)
-    return (decay.real < -UNSTABLE_GROWTH) & ((sums - np.minimum.accumulate(sums, axis=0)).max(axis=0) > UNSTABLE_GROWTH)
-
-
-def _modes(phase: CompiledPhase, length: float, p: np.ndarray, *, middle: bool) -> list[tuple[np.ndarray, list[str]]]:
-    """Eigenvalues (nx,) of the linearised dynamics and their states, at several points; none where some point has no fast decay."""
-    inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]
-    try:
-        jacobian = ca.Function("jacobian", inputs, [ca.densify(ca.jacobian(phase.dynamics(*inputs), inputs[0]))])
-    except RuntimeError:
-        return []
+def _growing(
+    problem: CompiledProblem, phase: CompiledPhase, scheme: Tableau, steps: np.ndarray, middle: bool
+) -> tuple[complex, str] | None:
+    """A mode that should vanish and grows in `steps` (N,), its rate and state, if there is one at each point, from the initial to the final
+    or guessed states, and in the `middle` of the bounds, under low, middle and high controls."""
+    length, controls = steps.sum(), phase.controls
     t0 = float(np.clip(phase.guesses.get("t0", phase.t0.upper), phase.t0.lower, phase.t0.upper))
-    start, s = np.array([t0]), np.array([t0, t0 + length, *p])
+    s = np.array([t0, t0 + length, *(problem.guesses.get(v.name, 0.5 * (v.lower + v.upper)) for v in problem.parameters)])
+    first = np.array([[0.5 * sum(limits)] for limits in phase.initial])
+    along = [state_along(phase, i, value, s[:1], s[1:2], np.linspace(0.0, 1.0, 5))[0] for i, value in enumerate(first)]
+    x = np.vstack([np.array(along).T, *([[0.5 * (v.lower + v.upper) for v in phase.states]] if middle else [])]).repeat(3, axis=0)
+    u = np.array([[v.lower + level * v.span for v in controls] for level in (0.0, 0.5, 1.0)] * (len(x) // 3)).reshape(len(x), len(controls))
+    try:
+        by_x = slopes(phase, x, u, np.full(len(x), t0 + 0.5 * length), s, np.zeros(phase.integrands.size1_out(0)))[0].swapaxes(1, 2)
+    except RuntimeError:  # the dynamics have no derivatives
+        return None
     span, found = np.array([v.span for v in phase.states]), []
-    first = [np.array([0.5 * sum(limits)]) for limits in phase.initial]
-    states = np.array([state_along(phase, i, value, start, start + length, PLACES_OF_MODES)[0] for i, value in enumerate(first)]).T
-    bounds = [[0.5 * (v.lower + v.upper) for v in phase.states]]
-    for x in np.vstack([states, bounds]) if middle else states:
-        for level in (0.0, 0.5, 1.0):
-            u = [v.lower + level * v.span for v in phase.controls]
-            matrix = np.array(jacobian(x, u, t0 + 0.5 * length, s))
-            if not np.isfinite(matrix).all() or _fastest(matrix) * length < UNSTABLE_GROWTH:
-                return []
-            rates, vectors = np.linalg.eig(matrix)
-            found.append((rates, [phase.states[i].name for i in np.argmax(np.abs(vectors) / span[:, None], axis=0)]))
-    return found
-
-
-def _fastest(matrix: np.ndarray) -> float:
-    """A rate at least as large as that of the fastest decay, from the circles of Gershgorin about the diagonal, by rows and by columns."""
-    rates, sizes = np.diag(matrix), np.abs(matrix)
-    return float(min((sizes.sum(axis=axis) - np.abs(rates) - rates).max() for axis in (0, 1)))
+    for rates, vectors in map(np.linalg.eig, by_x if np.isfinite(by_x).all() else ()):
+        growth = np.log(np.maximum(np.abs(scheme.stability(np.multiply.outer(steps, rates))), 1.0)).sum(axis=0)
+        growth = np.where((rates.real * length < -UNSTABLE_GROWTH) & (growth > UNSTABLE_GROWTH), growth, 0.0)
+        if not growth.any():
+            return None
+        worst = int(growth.argmax())
+        found.append((complex(rates[worst]), phase.states[int(np.argmax(np.abs(vectors[:, worst]) / span))].name))
+    return found[0] if found else None

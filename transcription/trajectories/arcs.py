@@ -48,10 +48,6 @@ class Arcs:
         s = np.array([[one.t0, one.tf, *parameters] for one, _, parameters in pieces])
         return cls(phase, edges[:, 0], edges[:, 1] - edges[:, 0], laws, pieces[0][0].control.basis, s)
 
-    def take(self, rows: np.ndarray) -> Arcs:
-        """The arcs of `rows` (indices or mask)."""
-        return Arcs(self.phase, self.begins[rows], self.lengths[rows], self.coefficients[rows], self.basis, self.s[rows])
-
     def integrate(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray:
         """States and integrals along all arcs. y (n, ny), atol (ny,) -> (n, len(DENSE)."""
         check_stopping(SIMULATION_GRACE)
@@ -79,7 +75,9 @@ class Arcs:
 
     def _some(self, rows: np.ndarray) -> Arcs:
         """The arcs of `rows`, in their order: itself, with its rates, if these are all."""
-        return self if len(rows) == len(self.begins) else self.take(rows)
+        if len(rows) == len(self.begins):
+            return self
+        return Arcs(self.phase, self.begins[rows], self.lengths[rows], self.coefficients[rows], self.basis, self.s[rows])
 
     def _integrated(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray | None:
         """All together; None if the integration breaks down."""

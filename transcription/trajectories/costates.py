@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from problems.compiled import CompiledPhase, CompiledProblem, remembered
 
-from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+from .trajectory import Named, PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PhaseCostates(Mapping[str, np.ndarray]):
+class PhaseCostates(Named[np.ndarray]):
     """The costates of one phase by state, at the trajectory's nodes: after a jump there, and before it at tf."""
 
+    what = "costate of state"
     names: tuple[str, ...]  # the states
     at_nodes: np.ndarray  # (k, nx): At the nodes of the trajectory
     hamiltonian: np.ndarray  # (k,): There
@@ -28,20 +29,13 @@ class PhaseCostates(Mapping[str, np.ndarray]):
     def __repr__(self) -> str:
         return f"PhaseCostates({len(self.at_nodes)} nodes, [{', '.join(self.names)}])"
 
-    def __getitem__(self, name: str) -> np.ndarray:
-        if name not in self.names:
-            raise KeyError(f"there is no costate of '{name}'; there are those of {', '.join(self.names)}")
-        return self.at_nodes[:, self.names.index(name)]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.names)
-
-    def __len__(self) -> int:
-        return len(self.names)
+    @property
+    def by_name(self) -> Mapping[str, np.ndarray]:
+        return dict(zip(self.names, self.at_nodes.T, strict=True))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Costates(Mapping[str, PhaseCostates]):
+class Costates(Named[PhaseCostates]):
     """Costates by phase, and the weights (m,) of the minimised objectives in their sum: not negative, of sum 1 in own units."""
 
     weights: np.ndarray
@@ -50,16 +44,9 @@ class Costates(Mapping[str, PhaseCostates]):
     def __repr__(self) -> str:
         return f"Costates({', '.join(self.phases)}; weights {self.weights})"
 
-    def __getitem__(self, name: str) -> PhaseCostates:
-        if name not in self.phases:
-            raise KeyError(f"no phase '{name}'; there are {', '.join(self.phases)}")
-        return self.phases[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.phases)
-
-    def __len__(self) -> int:
-        return len(self.phases)
+    @property
+    def by_name(self) -> Mapping[str, PhaseCostates]:
+        return self.phases
 
 
 def has_length(trajectory: Trajectory, phase: PhaseTrajectory) -> bool:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
 from problems.compiled import Limit, Variable
 
 from ..numerics.polynomials import basis_matrix
+
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -196,8 +200,30 @@ class PhaseTrajectory:
         return dict(zip((v.name for v in (*self.state_variables, *self.control_variables)), columns, strict=True))
 
 
+class Named(Mapping[str, Item]):
+    """Items by name, in order; where there is none of a name, the KeyError says which there are."""
+
+    what: ClassVar[str] = "phase"
+
+    @property
+    @abstractmethod
+    def by_name(self) -> Mapping[str, Item]:
+        """All of them."""
+
+    def __getitem__(self, name: str) -> Item:
+        if name not in self.by_name:
+            raise KeyError(f"no {self.what} '{name}'; there are {', '.join(self.by_name)}")
+        return self.by_name[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.by_name)
+
+    def __len__(self) -> int:
+        return len(self.by_name)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Mapping[str, PhaseTrajectory]):
+class Trajectory(Named[PhaseTrajectory]):
     """A whole trajectory: its phases by name, in the order in which they were declared, and its static parameters.
 
     Parameters
@@ -230,17 +256,9 @@ class Trajectory(Mapping[str, PhaseTrajectory]):
         parts = [*(phase._repr_html_() for phase in self.phases), *([f"<div>parameters: {values}</div>"] if values else [])]
         return f"<div>{''.join(parts)}</div>"
 
-    def __getitem__(self, name: str) -> PhaseTrajectory:
-        for phase in self.phases:
-            if phase.name == name:
-                return phase
-        raise KeyError(f"no phase '{name}'; there are {', '.join(self)}")
-
-    def __iter__(self) -> Iterator[str]:
-        return (phase.name for phase in self.phases)
-
-    def __len__(self) -> int:
-        return len(self.phases)
+    @property
+    def by_name(self) -> Mapping[str, PhaseTrajectory]:
+        return {phase.name: phase for phase in self.phases}
 
 
 def wrapped(controls: np.ndarray, variables: tuple[Variable, ...]) -> np.ndarray:
