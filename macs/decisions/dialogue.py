@@ -317,9 +317,8 @@ class Dialogue:
             If it is not a dialogue, is damaged, or of another problem.
         """
         record, points = read(path)
-        source = points.source
-        if problem is None and record.solves and points.dynamic and source is not None and (trust or is_catalogued(source.address)):
-            problem = replace(source, trusted=trust).load()
+        if problem is None and record.solves:
+            problem = own_problem(points, trust)
         with readable(path):
             ranges = Ranges(**record.ranges)
             method = None if record.transcription is None else from_dict(record.transcription)
@@ -423,3 +422,11 @@ class Dialogue:
         goals = {goal.name: goal for goal in self.goals}
         limits = " and ".join(f"{other} until {shown(limit, goals[other])}" for other, limit in giving.items())
         return f"better {name}{'' if to is None else f': {shown(to, goals[name])}'}{f', giving {limits}' if giving else ''}"
+
+
+def own_problem(points: Points, trust: bool) -> Problem | None:
+    """The problem that points name, if it has dynamics and may be loaded: it is in the catalogue, or its code is trusted."""
+    source = points.source
+    if source is None or source.vector or not source.address or not (trust or is_catalogued(source.address)):
+        return None
+    return replace(source, trusted=trust).load()

@@ -14,12 +14,11 @@ import numpy as np
 import transcription
 from macs.decisions import Choice, Dialogue, ReferencePoint, from_dict
 from macs.decisions.choice import choices_table
+from macs.decisions.dialogue import own_problem
 from macs.decisions.dialogue_file import is_dialogue, read
 from macs.front import Front
 from macs.fronts.pictures.front_plot import save_picture
 from macs.io.atomic import check_target
-from problems import Problem
-from problems.catalogue import is_catalogued
 from problems.checks import unknown
 from problems.compiled import Objective
 
@@ -124,16 +123,8 @@ def _begun(arguments: Namespace) -> Dialogue:
     if front.source is None and problem is not None:
         raise WrongCall(f"{path} is a front of a black box: it has no problem")
     if problem is None and not arguments.rank_only:
-        problem = _own_problem(front, arguments.trust)
+        problem = own_problem(front, arguments.trust)
     return Dialogue(front, problem, method)
-
-
-def _own_problem(front: Front, trust: bool) -> Problem | None:
-    """The problem that a front names, if it has dynamics and may be loaded."""
-    source = front.source
-    if source is None or source.vector or not source.address or not (trust or is_catalogued(source.address)):
-        return None
-    return source.load()
 
 
 def _improvement(arguments: Namespace, goals: Sequence[Objective]) -> tuple[str, float | None, dict[str, float]] | None:
