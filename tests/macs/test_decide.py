@@ -324,7 +324,7 @@ def test_ranges_that_say_nothing_of_where_the_front_is() -> None:
 
 @cache
 def front() -> Front:
-    return sweep(cart(), MESH, points=31, starts=1)
+    return sweep(cart(), MESH, points=11, starts=1)
 
 
 @pytest.mark.parametrize("preference", [one[0] for one in KNOWN[::5]], ids=[repr(one[0]) for one in KNOWN[::5]])

@@ -84,7 +84,10 @@ def test_numbers_and_symbols_agree(preference, kind):
                 assert number == pytest.approx(found[0], rel=1e-12, abs=1e-13)
 
 
-@pytest.mark.parametrize("preference", PREFERENCES, ids=lambda one: type(one).__name__)
+SLOW = [pytest.param(one, marks=[pytest.mark.slow] * isinstance(one, FuzzyPhysicalProgramming)) for one in PREFERENCES]
+
+
+@pytest.mark.parametrize("preference", SLOW, ids=lambda one: type(one).__name__)
 def test_values_rise_with_their_peaks_and_gradients_agree_with_differences(preference):
     """What gradient solves rely on: a variable that is not less than any of a group may stand for its peak."""
     symbols = [ca.SX.sym(goal.name) for goal in GOALS]

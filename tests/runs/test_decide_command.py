@@ -28,11 +28,9 @@ SCRIPT = "from problems import load\n\ndef build():\n    return load('goddard')\
 
 @pytest.fixture(scope="module")
 def fronts(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A front of a problem of the catalogue, and the same of a problem of the user's own."""
+    """A front of a problem of the catalogue."""
     folder = tmp_path_factory.mktemp("fronts")
-    (folder / "mine.py").write_text(SCRIPT, encoding="utf-8")
-    for name, address in (("goddard.nc", "goddard"), ("mine.nc", f"{folder / 'mine.py'}:build")):
-        sweep(load(address), DFET(4, 6), points=8, starts=1).save(folder / name)
+    sweep(load("goddard"), DFET(4, 6), points=8, starts=1).save(folder / "goddard.nc")
     return folder
 
 
@@ -85,13 +83,14 @@ def test_a_preference_from_a_file_and_alternatives(fronts: Path, here: Path, cap
 
 
 @pytest.mark.slow
-def test_a_problem_that_is_not_at_hand(fronts: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    front = str(fronts / "mine.nc")
-    call = ["decide", front, "--improve", "flight time", "--to", "160"]
+def test_a_problem_that_is_not_at_hand(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "mine.py").write_text(SCRIPT, encoding="utf-8")
+    sweep(load("mine.py:build"), DFET(4, 6), points=8, starts=1).save("mine.nc")
+    call = ["decide", "mine.nc", "--improve", "flight time", "--to", "160"]
     assert main(call) == 0
     said = capsys.readouterr().out
     assert "The problem 'goddard' is not at hand: give it by --problem, or --trust" in said and "were ranked" in said
-    for more in (["--trust"], ["--problem", f"{fronts / 'mine.py'}:build"], ["--problem", "goddard"]):
+    for more in (["--trust"], ["--problem", "mine.py:build"], ["--problem", "goddard"]):
         assert main([*call, *more, "--out", "c.nc"]) == 0
         assert "ranked" not in capsys.readouterr().out
         assert Front.load("c.nc")[0].objectives["flight time"] == pytest.approx(160.0, rel=1e-5)
