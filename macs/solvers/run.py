@@ -142,7 +142,7 @@ class SearchRun:
             self._checkpoint.keep(self._state, RunStatus(self._seed, counts, self._idle, self._interrupts.elapsed, stopped))
 
     def _cut_short(self) -> bool:
-        """Whether a time limit, Ctrl-C or the callback has cut work short since the state was last status."""
+        """Whether a time limit, Ctrl-C or the callback has cut work short since the state was last kept."""
         return bool(self._reason) and self.evaluator.counts.clocked > self._uncut
 
     @property

@@ -144,17 +144,8 @@ def test_points_that_are_not_what_they_say_are_not_verified(front):
 
 
 def _with(front: Front, decision: np.ndarray) -> Front:
-    return Front(
-        F=front.F,
-        decision=decision,
-        violation=front.violation,
-        status=front.status,
-        goals=front.goals,
-        variables=front.variables,
-        problem=front.problem,
-        stats=front.stats,
-        sort=False,
-    )
+    same = {name: getattr(front, name) for name in ("F", "violation", "status", "goals", "variables", "problem", "stats")}
+    return Front(decision=decision, sort=False, **same)
 
 
 def test_other_data_evaluate_the_same_points(front):
