@@ -246,7 +246,7 @@ class Study:
         check_workers(jobs, executor)
         chosen = self.chosen(solvers)
         with Store.claim(out, self.definition()) as store:
-            execute(store, self.runs, chosen, self._task, self.objectives, jobs, executor, retry, progress)
+            execute(store, self.runs, chosen, self._task, jobs, executor, retry, progress)
             return store.summary(self.runs)
 
     def chosen(self, solvers: Sequence[str] | None) -> list[str]:
@@ -309,6 +309,10 @@ class Study:
         return {
             **{name: key["record"](getattr(self, name)) for name, key in recorded.items()},
             "decides": [name for name, key in recorded.items() if key["decides"]],
+            "objectives": {
+                label: [{"name": goal.name, "unit": goal.unit, "sense": goal.sense} for goal in goals]
+                for label, goals in self.objectives.items()
+            },
             "cells": [cell.to_dict() for cell in self.cells],
         }
 

@@ -196,19 +196,18 @@ def combine(
     budgets = _budgets(evaluations, stated)
     check_terms(terms, methods)
     labels = transcriptions if isinstance(transcriptions, Mapping) and not set(transcriptions) & set(stated) else {}
-    own_budgets, own_schemes = {}, {}
-    for label, given in terms.items():
-        if "transcription" in given:
-            with errors_begin_with(f"terms of '{label}'"):
+    # Of each solver: {label of a problem: its transcriptions by label}, and {label of a problem: its budget}.
+    offered, allowed = dict.fromkeys(methods, schemes), dict.fromkeys(methods, budgets)
+    for solver_label, given in terms.items():
+        with errors_begin_with(f"terms of '{solver_label}'"):
+            if "transcription" in given:
                 _refuse_transcriptions("transcription", given["transcription"], vectors)
                 own = _by_problem("transcription", given["transcription"], flying, lambda problem: problem.default_transcription)
-                own_schemes[label] = {name: _named_schemes(_by_label(scheme, labels)) for name, scheme in own.items()}
-        if "evaluations" in given:
-            with errors_begin_with(f"terms of '{label}'"):
-                own_budgets[label] = _budgets(given["evaluations"], stated)
+                offered[solver_label] = schemes | {name: _named_schemes(_by_label(one, labels)) for name, one in own.items()}
+            if "evaluations" in given:
+                allowed[solver_label] = _budgets(given["evaluations"], stated)
     combined = []
     compiled: dict[str, CompiledProblem | CompiledVectorProblem] = {}
-    common = [one for one in methods if "transcription" not in terms.get(one, {})]
     for label, statement in stated.items():
         with errors_begin_with("problems", anything=f"'{label}' is stated wrongly"):
             problem = compiled[label] = statement.compile()
@@ -216,27 +215,27 @@ def combine(
             identity = {"name": problem.name, "data": dict(problem.data), "fingerprint": problem.fingerprint}
         with errors_begin_with(f"problems: '{label}'"):
             theirs = terms_of_problem(statement, inner, start)
-        offered = [(name, scheme, common) for name, scheme in schemes[label].items() if common]
-        for one in methods:
-            if one not in common:
-                own_ones = schemes[label] if label in vectors else own_schemes[one][label]
-                offered += [(name, scheme, [one]) for name, scheme in own_ones.items()]
-        for scheme_label, scheme, method_labels in offered:
-            stated_so = _pickled(f"{label}, {scheme_label}", _sendable(problem), scheme)
-            for method_label in method_labels:
-                method, own = methods[method_label], {**theirs, **terms.get(method_label, {})}
-                budget = own_budgets.get(method_label, budgets)[label]
-                own |= {"evaluations": AUTO if budget is None else budget} if method_label in own_budgets else {}
-                place = f"{label}, {scheme_label}, {method_label}"
-                if budget is None and not method.searches_until_done:
-                    raise ValueError(f"{place}: evaluations {AUTO!r} is for MACS; state a number, if need be in terms of '{method_label}'")
-                with errors_begin_with(place):
-                    method.check_objectives(len(problem.goals))
-                    _check_method(method, scheme, problem, own.get("start", start))
-                details = {"problem": identity, "transcription": scheme and scheme.to_dict(), "solver": method.about()}
-                details |= {"terms": own} if own else {}
-                cell = Cell(label, scheme_label, method_label, budget, plain(details))
-                combined.append((cell, (stated_so, _pickled(place, method))))
+        # Solvers on the transcriptions of the study stand side by side, before those on transcriptions of their own.
+        places = [(name, one) for name in schemes[label] for one in methods if offered[one] is schemes]
+        places += [(name, one) for one in methods if offered[one] is not schemes for name in offered[one][label]]
+        pickles: dict[int, bytes] = {}
+        for name, solver_label in places:
+            scheme, budget, method = offered[solver_label][label][name], allowed[solver_label][label], methods[solver_label]
+            place = f"{label}, {name}, {solver_label}"
+            if id(scheme) not in pickles:
+                pickles[id(scheme)] = _pickled(f"{label}, {name}", _sendable(problem), scheme)
+            own = {**theirs, **terms.get(solver_label, {})}
+            if allowed[solver_label] is not budgets:
+                own["evaluations"] = AUTO if budget is None else budget
+            if budget is None and not method.searches_until_done:
+                raise ValueError(f"{place}: evaluations {AUTO!r} is for MACS; state a number, if need be in terms of '{solver_label}'")
+            with errors_begin_with(place):
+                method.check_objectives(len(problem.goals))
+                _check_method(method, scheme, problem, own.get("start", start))
+            details = {"problem": identity, "transcription": scheme and scheme.to_dict(), "solver": method.about()}
+            details |= {"terms": own} if own else {}
+            cell = Cell(label, name, solver_label, budget, plain(details))
+            combined.append((cell, (pickles[id(scheme)], _pickled(place, method))))
     return combined, compiled, methods
 
 

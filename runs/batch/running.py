@@ -6,7 +6,7 @@ from __future__ import annotations
 import queue
 import time
 import traceback
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import suppress
 from pathlib import Path
@@ -18,9 +18,8 @@ import msgspec
 from macs.io.atomic import write_whole
 from macs.io.console import Display, minutes
 from problems.checks import check_count
-from problems.compiled import Objective
 
-from ..execution.processes import ExecutorWorkers, LocalWorkers
+from ..execution.processes import LocalWorkers, perform_apart
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, RunOutcome, RunTask
 from ..files import checked, read_record, to_record
 from .store import MISSING, UNREADABLE, Store, StoredRun, reason
@@ -46,14 +45,6 @@ class RunProgress(msgspec.Struct):
     elapsed: float
 
 
-class ObjectiveRecord(msgspec.Struct):
-    """Name, unit and sense of an objective."""
-
-    name: str
-    unit: str
-    sense: str
-
-
 class ProgressRecord(msgspec.Struct):
     """How a study proceeds."""
 
@@ -61,7 +52,6 @@ class ProgressRecord(msgspec.Struct):
     elapsed: float  # seconds since then
     left: float | None  # seconds that the rest takes, if it goes on like this; None if that is not known yet
     going: list[RunProgress]  # the runs that are being made; runs on the workers of an executor are not known
-    goals: dict[str, list[ObjectiveRecord]] = {}  # objectives by label of the problem: no front has to be read to know them
 
 
 def read_progress(folder: Path) -> ProgressRecord | None:
@@ -87,7 +77,6 @@ class StudyDisplay(Display):
         shown: bool,
         stream: TextIO | None = None,
         folder: Path | None = None,
-        goals: Mapping[str, Sequence[Objective]] | None = None,
     ) -> None:
         super().__init__(shown, stream)
         self._title, self._total = title, len(runs)
@@ -96,7 +85,6 @@ class StudyDisplay(Display):
         self._work, self._done = sum(run.cell.planned for run in todo), 0
         self._going: dict[tuple[str, int], tuple[StoredRun, int, float]] = {}
         self._path, self._start, self._saved = folder and folder / PROGRESS_FILE, time.time(), -float("inf")
-        self._goals = {label: [ObjectiveRecord(goal.name, goal.unit, goal.sense) for goal in ones] for label, ones in (goals or {}).items()}
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         super().__exit__(kind, error, trace)
@@ -110,7 +98,7 @@ class StudyDisplay(Display):
         if self._path and self.elapsed - self._saved >= 1.0:
             self._saved = self.elapsed
             going, left = self.going()
-            record = ProgressRecord(self._start, self.elapsed, left, going, self._goals)
+            record = ProgressRecord(self._start, self.elapsed, left, going)
             with suppress(OSError):
                 write_whole(self._path, to_record(msgspec.to_builtins(record)))
 
@@ -176,7 +164,6 @@ def execute(
     count: int,
     solvers: Collection[str],
     task_of: Callable[[StoredRun, Path], RunTask],
-    goals: Mapping[str, Sequence[Objective]],
     jobs: int,
     executor: Executor | None,
     retry: bool,
@@ -189,18 +176,25 @@ def execute(
     todo = [run for run in every if run.status in AGAIN or (retry and run.status == CRASHED)]
     if not todo:
         return
-    workers: LocalWorkers | ExecutorWorkers = LocalWorkers(min(jobs, len(todo))) if executor is None else ExecutorWorkers(executor)
+    workers = LocalWorkers(min(jobs, len(todo))) if executor is None else executor
     runs: dict[Future[RunOutcome], StoredRun] = {}
     done: queue.SimpleQueue[Future[RunOutcome]] = queue.SimpleQueue()
-    with StudyDisplay(store.definition["name"], every, todo, progress, folder=store.path, goals=goals) as display:
+    with StudyDisplay(store.definition["name"], every, todo, progress, folder=store.path) as display:
 
         def keep(run: StoredRun, outcome: RunOutcome) -> None:
             store.keep(run, outcome)
             display.ended(run, outcome)
 
+        def stop() -> None:
+            if isinstance(workers, LocalWorkers):
+                workers.stop()
+            for future in runs:  # an executor belongs to the caller: it ends the runs it has begun
+                future.cancel()
+
         try:
             for run in todo:
-                future = workers.submit(task_of(run, store.checkpoint_path(run)), display.reporter(run))
+                told = [display.reporter(run)] if executor is None else []  # workers elsewhere cannot call it
+                future = workers.submit(perform_apart, task_of(run, store.checkpoint_path(run)), *told)
                 runs[future] = run
                 future.add_done_callback(done.put)
             while runs:
@@ -214,14 +208,14 @@ def execute(
         except OSError:
             raise
         except BaseException:
-            workers.stop()
+            stop()
             while not done.empty():
                 future = done.get()
                 if not future.cancelled() and future.exception() is None and future.result().status == FINISHED:
                     keep(runs[future], future.result())
             raise
         finally:
-            workers.stop()
+            stop()
 
 
 def _outcome(future: Future[RunOutcome], left: int) -> RunOutcome:

@@ -5,7 +5,7 @@ CELL/RUN.nc     the front of a finished run, 0001.nc being the first: a run is f
 CELL/RUN.json   the record of a run: of a finished one its history, of any other its status and traceback
 CELL/RUN.checkpoint, CELL/RUN.samples   the state of a run that has begun and not ended, written by its own process
 .lock           the lock of the process that runs the study
-.progress       how that process proceeds, written every second and deleted at its end, see `progress`
+.progress       how that process proceeds, written every second and deleted at its end, see `running`
 
 Every file is written whole, all but checkpoints and samples by the process that runs the study. Those in JSON are records with a checksum.
 """
@@ -244,9 +244,13 @@ class Store:
             for number in range(1, (self.definition["runs"] if count is None else count) + 1):
                 yield self.run(cell, number)
 
+    def front_path(self, cell: Cell, number: int) -> Path:
+        """The file of a run's front."""
+        return self.path / cell.folder / f"{number:04d}.nc"
+
     def run(self, cell: Cell, number: int) -> StoredRun:
         """One run."""
-        path, record, status, message = self.path / cell.folder / f"{number:04d}.nc", RunRecord(), UNREADABLE, ""
+        path, record, status, message = self.front_path(cell, number), RunRecord(), UNREADABLE, ""
         try:
             record = _record(path.with_suffix(".json"))
             if path.exists():

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import hashlib
 import threading
-import time
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -32,23 +31,27 @@ from .pages import cells_data, failures_data, measured_data, problem_name, read_
 from .points import LIMITS, details, goals_data
 
 SUFFIX = ".nc"
+T = TypeVar("T")
 
 
-class Stamp(NamedTuple):
-    """What differs once a file has been written again: its number, its size, and the time in seconds since 1970."""
-
-    number: int
-    size: int
-    time: float
+def stamps_of(*paths: Path) -> str:
+    """A text that differs once one of some files has been written again, or is gone: their numbers, sizes and times."""
+    known = [path.stat() if path.exists() else None for path in paths]
+    return str([one and (one.st_ino, one.st_size, one.st_mtime_ns) for one in known])
 
 
-def stamp_of(path: Path) -> Stamp | None:
-    """The stamp of a file; None if it is not there."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return Stamp(found.st_ino, found.st_size, found.st_mtime_ns * 1e-9)
+class Readings:
+    """What was made of files; it is made again once one of them has changed."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[Path, ...], tuple[str, Any]] = {}
+
+    def of(self, make: Callable[[], T], *paths: Path) -> T:
+        """What `make` returns for these files, or did when they were the same as now."""
+        stamps = stamps_of(*paths)  # before the files are read: what changes meanwhile is read again
+        if self._known.get(paths, ("",))[0] != stamps:
+            self._known[paths] = stamps, make()
+        return self._known[paths][1]
 
 
 @dataclass(frozen=True)
@@ -88,15 +91,11 @@ class Followed(ABC):
                 self._state = self.look()
             except (ValueError, OSError) as error:
                 trouble = _line(error)
-            return {**self._state, "trouble": trouble, "versions": self.versions()}
+            return {**self._state, "trouble": trouble, "versions": {name: one.version for name, one in self.answers.items()}}
 
-    def versions(self) -> dict[str, str]:
-        """The version of each answer."""
-        return {name: one.version for name, one in self.answers.items()}
-
-    def answer(self, name: str) -> Answer | None:
-        """The answer of this name; None if there is none."""
-        return self.answers.get(name)
+    def answer(self, name: str) -> bytes | None:
+        """The content of an answer; None if there is none of this name."""
+        return self.answers[name].content if name in self.answers else None
 
     def details(self, block: str) -> bytes | None:
         """What is shown of the points of a run once they are selected, compressed; None if there is no such run."""
@@ -114,8 +113,7 @@ class FollowedFronts(Followed):
     def __init__(self, path: str | PathLike[str]) -> None:
         super().__init__()
         self._path, self.title = Path(path), Path(path).resolve().name
-        self._single = not self._path.is_dir()
-        self._read: dict[Path, tuple[Stamp | None, Front]] = {}
+        self._single, self._readings = not self._path.is_dir(), Readings()
         if self._single:
             read_front(self._path)
         elif not self._files():
@@ -123,23 +121,22 @@ class FollowedFronts(Followed):
 
     def look(self) -> Mapping[str, Any]:
         """See `Followed`."""
-        before, self._read = self._read, {}
+        fronts: dict[Path, Front] = {}
         unreadable = []
         for path in self._files():
-            stamp = stamp_of(path)
             try:
-                self._read[path] = before[path] if path in before and before[path][0] == stamp else (stamp, read_front(path))
+                fronts[path] = self._readings.of(lambda path=path: read_front(path), path)  # type: ignore[misc]
             except (ValueError, OSError) as error:
                 if self._single:
                     raise
                 unreadable.append(f"{path.name} cannot be read now: {_line(error)}")
-        groups: dict[Any, list[Path]] = {}
-        for path, (_, front) in self._read.items():
-            groups.setdefault((problem_name(front), tuple(front.goals)), []).append(path)
-        shown = [self._comparison(name, goals, paths) for (name, goals), paths in groups.items()]
+        groups: dict[Any, dict[Path, Front]] = {}
+        for path, front in fronts.items():
+            groups.setdefault((problem_name(front), tuple(front.goals)), {})[path] = front
+        shown = [self._comparison(name, goals, ones) for (name, goals), ones in groups.items()]
         title, kind = (shown[0]["name"], "front") if self._single else (self.title, "fronts")
         self.answers["data"] = Answer.of({"title": title, "kind": kind, "comparisons": shown, "unreadable": unreadable})
-        self.fronts = {_block(path): front for path, (_, front) in self._read.items()}
+        self.fronts = {_block(path): front for path, front in fronts.items()}
         return {}
 
     def _files(self) -> list[Path]:
@@ -147,12 +144,12 @@ class FollowedFronts(Followed):
             return [self._path]
         return sorted(path for path in self._path.iterdir() if path.suffix == SUFFIX and not path.name.startswith("."))
 
-    def _comparison(self, name: str, goals: Sequence[Objective], paths: Sequence[Path]) -> dict[str, Any]:
+    def _comparison(self, name: str, goals: Sequence[Objective], fronts: Mapping[Path, Front]) -> dict[str, Any]:
         """As `front_page` has it; of a folder with the names of the files in place of solvers."""
-        labels = [solver_name(self._read[path][1]) if self._single else path.stem for path in paths]
+        labels = [solver_name(front) if self._single else path.stem for path, front in fronts.items()]
         runs = [
-            run_data(self._read[path][1], label, block=_block(path), version=str(self._read[path][0]))
-            for path, label in zip(paths, labels, strict=True)
+            run_data(front, label, block=_block(path), version=stamps_of(path))
+            for (path, front), label in zip(fronts.items(), labels, strict=True)
         ]
         ids = f"{name}, {', '.join(goal.name for goal in goals)}"
         return {"id": ids, "name": name, "goals": goals_data(goals), "solvers": labels, "runs": runs}
@@ -163,24 +160,30 @@ def _block(path: Path) -> str:
     return hashlib.sha256(path.name.encode()).hexdigest()[:16]
 
 
+def _files_of(run: StoredRun) -> tuple[Path, Path]:
+    """The front of a run, and its record."""
+    return run.path, run.path.with_suffix(".json")
+
+
 class FollowedStore(Store):
     """A study's folder; the same run is the same object as long as its front and its record are the same files."""
 
     def __init__(self, path: Path, definition: Mapping[str, Any], trust: bool = False) -> None:
         super().__init__(path, definition, trust)
-        self.stamps: dict[tuple[str, int], tuple[Stamp | None, Stamp | None]] = {}
-        self._runs: dict[tuple[str, int], StoredRun] = {}
-        self.own_stamp = stamp_of(path / "study.json")  # differs once the study is to have more runs, say
+        self._runs = Readings()
 
     def run(self, cell: Cell, number: int) -> StoredRun:
         """One run."""
-        key, front = (cell.folder, number), self.path / cell.folder / f"{number:04d}.nc"
-        # Taken before the files are read: what changes meanwhile is read again.
-        stamps = stamp_of(front), stamp_of(front.with_suffix(".json"))
-        if self.stamps.get(key) != stamps or key not in self._runs:
-            self._runs[key] = super().run(cell, number)
-            self.stamps[key] = stamps
-        return self._runs[key]
+        front = self.front_path(cell, number)
+        return self._runs.of(lambda: super(FollowedStore, self).run(cell, number), front, front.with_suffix(".json"))
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A finished run: its front, and its data on the page."""
+
+    front: Front
+    data: msgspec.Raw
 
 
 Key = tuple[str, int]
@@ -192,187 +195,161 @@ def key_of(run: StoredRun) -> Key:
     return run.cell.folder, run.number
 
 
-@dataclass(frozen=True)
-class Sampled:
-    """The last sample of a run that has not ended."""
-
-    stamp: Stamp | None
-    evaluations: int
-    elapsed: float
-    F: np.ndarray
-
-
 class FollowedStudy(Followed):
     """A study's folder, while the study runs or later."""
 
     def __init__(self, folder: str | PathLike[str], trust: bool = False) -> None:
         super().__init__()
+        self._folder, self._trust = Path(folder), trust
         self._store = FollowedStore.open(folder, trust)
         self.title = str(self._store.definition["name"])
-        self._read: dict[Key, tuple[StoredRun, Front, msgspec.Raw]] = {}  # finished runs, and their data on the page
-        self._sampled: dict[Key, Sampled] = {}
-        self._goals: dict[str, list[dict[str, Any]]] = {}
-        # What the files were of which the comparison of solvers was made or is to be made, when that ended, and the seconds that it took.
-        self._measuring, self._measured, self._wanted = threading.Lock(), Answer(b"", ""), ""
-        self._ended, self._took = 0.0, 0.0
+        self._stores, self._shown = Readings(), Readings()
+        self._measuring, self._measured = threading.Lock(), Answer(b"", "")
 
     def look(self) -> Mapping[str, Any]:
         """See `Followed`."""
-        if self._store.own_stamp != stamp_of(self._store.path / "study.json"):
-            self._store = FollowedStore.open(self._store.path, self._store.trust)
-        store = self._store
+        store = self._stores.of(lambda: FollowedStore.open(self._folder, self._trust), self._folder / "study.json")
+        self._store = store
         summary, progress = store.summary(), read_progress(store.path)
-        unreadable = self._read_fronts(summary)
-        self._sampled = self._read_samples(summary, progress)
-        if progress is not None:
-            self._goals |= {label: [msgspec.to_builtins(goal) for goal in goals] for label, goals in progress.goals.items()}
-        shown = self._comparisons()
+        shown, unreadable = self._read(summary)
+        going = _going(summary, progress)
+        found = self._comparisons(shown)
         data = {"title": summary.name, "kind": "study", "failures": failures_data(summary), "unreadable": unreadable}
-        self.answers["data"] = Answer.of({**data, "comparisons": [one for one, _ in shown]})
-        self.answers["going"] = Answer.of({one["id"]: self._going(one["goals"], runs) for one, runs in shown})
-        self.fronts = {self._block(run): front for run, front, _ in self._read.values()}
-        # While the study runs, comparing takes at most a tenth of the time.
-        if progress is None or time.monotonic() - self._ended >= 10.0 * self._took:
-            self._wanted = Answer.of([str(store.stamps), sorted(self._goals)]).version
-        return self._status(summary, progress)
+        self.answers["data"] = Answer.of({**data, "comparisons": [one for one, _ in found]})
+        self.answers["going"] = Answer.of({one["id"]: _points_so_far(one["goals"], runs, going) for one, runs in found})
+        # Made once it is asked for, as it may take minutes.
+        self.answers["measures"] = Answer(b"", Answer.of([stamps_of(*_files_of(run)) for run in summary.runs]).version)
+        self.fronts = {self._block(run): shown[key_of(run)].front for run in summary.runs if key_of(run) in shown}
+        return _state(summary, progress, going)
 
-    def versions(self) -> dict[str, str]:
-        """See `Followed`."""
-        return {**super().versions(), "measures": self._wanted}
-
-    def answer(self, name: str) -> Answer | None:
-        """See `Followed`. The comparison of solvers, which may take minutes, is made once it is asked for."""
-        if name != "measures" or not self._wanted:
+    def answer(self, name: str) -> bytes | None:
+        """See `Followed`. The comparison of solvers is made now, unless it is known for these runs."""
+        if name != "measures" or name not in self.answers:
             return super().answer(name)
         with self._measuring:
-            wanted = self._wanted
+            wanted = self.answers[name].version
             if self._measured.version != wanted:
-                began = time.monotonic()
-                self._measured = Answer(msgspec.json.encode(self._measures(self._store)), wanted)
-                self._ended = time.monotonic()
-                self._took = self._ended - began
-            return self._measured
+                self._measured = Answer(msgspec.json.encode(_measures(self._store)), wanted)
+            return self._measured.content
 
-    def _measures(self, store: Store) -> dict[str, Any]:
-        """Indicators, attainment surfaces, convergence and tables of the finished runs."""
-        try:
-            summary = store.summary()
-            found = comparisons(store, {}) if summary.finished else []
-            data = {f"{one.problem}, {one.transcription}": measured_data(one, store.definition) for one in found}
-            tables = tables_data(tables_across(found, store.definition))
-            return {"comparisons": data, "tables": tables, "finished": summary.finished, "trouble": ""}
-        except (ValueError, OSError) as error:
-            return {"comparisons": {}, "tables": [], "finished": 0, "trouble": _line(error)}
-
-    def _read_fronts(self, summary: StudySummary) -> list[str]:
-        """Read the fronts that are new; returns why others cannot be read now."""
+    def _read(self, summary: StudySummary) -> tuple[dict[Key, Shown], list[str]]:
+        """The finished runs that can be read, and why others cannot now."""
+        shown: dict[Key, Shown] = {}
         unreadable: list[str] = []
-        before, self._read = self._read, {}
         for run in summary.runs:
-            key = key_of(run)
-            if not run.finished:
-                continue
-            if key in before and before[key][0] is run:
-                self._read[key] = before[key]
-                continue
-            try:
-                front = _front_of(run)
-            except (ValueError, OSError) as error:
-                unreadable.append(f"Run {run.number} of {run.cell.name} cannot be read now: {_line(error)}")
-                continue
-            more = {"seed": str(run.seed), "version": str(self._store.stamps[key])}
-            data = run_data(front, run.cell.solver, run.number, self._block(run), **more)
-            self._read[key] = run, front, msgspec.Raw(msgspec.json.encode(data))
-        return unreadable
+            if run.finished:
+                try:
+                    shown[key_of(run)] = self._shown.of(lambda run=run: self._show(run), *_files_of(run))  # type: ignore[misc]
+                except (ValueError, OSError) as error:
+                    unreadable.append(f"Run {run.number} of {run.cell.name} cannot be read now: {_line(error)}")
+        return shown, unreadable
 
-    def _read_samples(self, summary: StudySummary, progress: ProgressRecord | None) -> dict[Key, Sampled]:
-        """The runs that are being made, each with its last sample if it has one."""
-        if progress is None:
-            return {}
-        told = {(one.folder, one.number): one for one in progress.going}
-        found: dict[Key, Sampled] = {}
-        for run in summary.runs:
-            key, path = key_of(run), samples_path(run.path.with_suffix(".checkpoint"))
-            stamp = None if run.finished else stamp_of(path)
-            # On the workers of an executor only the samples show that a run is being made.
-            if key not in told and (stamp is None or stamp.time < progress.began):
-                continue
-            before = self._sampled.get(key)
-            last = before if before is not None and before.stamp == stamp else _last_sample(path, stamp)
-            if key in told:
-                last = replace(last, evaluations=told[key].evaluations, elapsed=told[key].elapsed)
-            found[key] = last
-        return found
+    def _show(self, run: StoredRun) -> Shown:
+        try:
+            front = run.front
+        except ValueError:  # where its problem is not trusted, it cannot be simulated, but shown
+            front = read_front(run.path)
+        more = {"seed": str(run.seed), "version": stamps_of(*_files_of(run))}
+        return Shown(front, msgspec.Raw(msgspec.json.encode(run_data(front, run.cell.solver, run.number, self._block(run), **more))))
 
     def _block(self, run: StoredRun) -> str:
         """The name of a run in addresses and in the page: the same as long as the study has the same cells."""
         return f"{self._store.cells.index(run.cell)}-{run.number}"
 
-    def _comparisons(self) -> list[tuple[dict[str, Any], list[StoredRun]]]:
+    def _comparisons(self, shown: Mapping[Key, Shown]) -> list[tuple[dict[str, Any], list[StoredRun]]]:
         """As `study_page` has them, but for measures and tables; of each all runs, made or not."""
-        shown = []
+        objectives = self._store.definition.get("objectives", {})
+        found = []
         for (problem, transcription), solvers in compared(self._store).items():
             runs = [run for ones in solvers.values() for run in ones]
-            read = [self._read[key_of(run)] for run in runs if key_of(run) in self._read]
-            if not read and problem not in self._goals:
+            read = [shown[key_of(run)] for run in runs if key_of(run) in shown]
+            if not read and problem not in objectives:  # studies by older versions do not state them
                 continue
-            goals = goals_data(read[0][1].goals) if read else self._goals[problem]
-            name = problem_name(read[0][1]) if read and read[0][1].source is not None and ".py:" in problem else problem
+            goals = goals_data(read[0].front.goals) if read else objectives[problem]
+            name = problem_name(read[0].front) if read and read[0].front.source is not None and ".py:" in problem else problem
             ids = {"id": f"{problem}, {transcription}", "name": f"{name}, {transcription}"}
-            shown.append(({**ids, "goals": goals, "solvers": list(solvers), "runs": [data for *_, data in read]}, runs))
-        return shown
-
-    def _going(self, goals: Sequence[Mapping[str, Any]], runs: Sequence[StoredRun]) -> list[dict[str, Any]]:
-        """The points so far of each run that is being made, objectives as columns in the user's senses."""
-        signs = np.array([Objective(**goal).sign for goal in goals])
-        found = []
-        for run in runs:
-            sampled = self._sampled.get(key_of(run))
-            if sampled is not None and sampled.F.ndim == 2 and sampled.F.shape[1] == len(signs):
-                objectives = (sampled.F * signs).T.tolist()
-                found.append({"solver": run.cell.solver, "number": run.number, "objectives": objectives})
+            found.append(({**ids, "goals": goals, "solvers": list(solvers), "runs": [one.data for one in read]}, runs))
         return found
 
-    def _status(self, summary: StudySummary, progress: ProgressRecord | None) -> dict[str, Any]:
-        """How many runs of each cell there are in which state, and the runs that are being made."""
-        going = self._sampled
 
-        def state(run: StoredRun) -> str:
-            if run.finished:
-                return "finished"
-            return "running" if key_of(run) in going else "waiting" if run.status == MISSING else "failed"
-
-        made = [
-            {
-                "name": f"{run.cell.name}, run {run.number}",
-                "evaluations": going[key_of(run)].evaluations,
-                "budget": run.cell.evaluations,
-                "elapsed": going[key_of(run)].elapsed,
-            }
-            for run in sorted(summary.runs, key=lambda run: (run.number, run.cell.name))
-            if key_of(run) in going
-        ]
-        states = dict.fromkeys(("finished", "running", "waiting", "failed"), 0) | Counter(map(state, summary.runs))
-        times = {"elapsed": progress.elapsed, "left": progress.left} if progress is not None else {"elapsed": None, "left": None}
-        total = {"total": len(summary.runs), **states, "alive": progress is not None, **times}
-        return {**total, "cells": cells_data(summary, state), "going": made}
-
-
-def _front_of(run: StoredRun) -> Front:
-    """The front of a run as data: where its problem is not trusted, it cannot be simulated, but shown."""
+def _measures(store: Store) -> dict[str, Any]:
+    """Indicators, attainment surfaces, convergence and tables of the finished runs."""
     try:
-        return run.front
-    except ValueError:
-        return read_front(run.path)
+        summary = store.summary()
+        found = comparisons(store, {}) if summary.finished else []
+        data = {f"{one.problem}, {one.transcription}": measured_data(one, store.definition) for one in found}
+        tables = tables_data(tables_across(found, store.definition))
+        return {"comparisons": data, "tables": tables, "finished": summary.finished, "trouble": ""}
+    except (ValueError, OSError) as error:
+        return {"comparisons": {}, "tables": [], "finished": 0, "trouble": _line(error)}
 
 
-def _last_sample(path: Path, stamp: Stamp | None) -> Sampled:
+@dataclass(frozen=True)
+class Going:
+    """A run that is being made: its evaluations and seconds so far, and the objectives, all minimised, of its last sample."""
+
+    evaluations: int = 0
+    elapsed: float = 0.0
+    F: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+
+
+def _going(summary: StudySummary, progress: ProgressRecord | None) -> dict[Key, Going]:
+    """The runs that are being made."""
+    if progress is None:
+        return {}
+    told = {(one.folder, one.number): one for one in progress.going}
+    found: dict[Key, Going] = {}
+    for run in summary.runs:
+        key, path = key_of(run), samples_path(run.path.with_suffix(".checkpoint"))
+        # On the workers of an executor only the samples show that a run is being made.
+        if not run.finished and (key in told or (path.exists() and path.stat().st_mtime >= progress.began)):
+            last = _last_sample(path)
+            found[key] = replace(last, evaluations=told[key].evaluations, elapsed=told[key].elapsed) if key in told else last
+    return found
+
+
+def _last_sample(path: Path) -> Going:
     """The last sample in a file; one without points if there is none that can be read."""
     try:
         columns = checked(read_record(path), History)
-        return Sampled(stamp, columns["evaluations"][-1], columns["elapsed"][-1], np.array(columns["F"][-1], dtype=float))
+        return Going(columns["evaluations"][-1], columns["elapsed"][-1], np.array(columns["F"][-1], dtype=float))
     except (OSError, ValueError, LookupError):  # it is replaced, or deleted as the run has ended: the next look shows
-        return Sampled(stamp, 0, 0.0, np.empty((0, 0)))
+        return Going()
+
+
+def _points_so_far(goals: Sequence[Mapping[str, Any]], runs: Sequence[StoredRun], going: Mapping[Key, Going]) -> list[dict[str, Any]]:
+    """The last sample of each run that is being made, objectives as columns in the user's senses."""
+    signs = np.array([Objective(**goal).sign for goal in goals])
+    made = [(run, going[key_of(run)].F) for run in runs if key_of(run) in going]
+    return [
+        {"solver": run.cell.solver, "number": run.number, "objectives": (F * signs).T.tolist()}
+        for run, F in made
+        if F.ndim == 2 and F.shape[1] == len(signs)
+    ]
+
+
+def _state(summary: StudySummary, progress: ProgressRecord | None, going: Mapping[Key, Going]) -> dict[str, Any]:
+    """How many runs of each cell there are in which state, and the runs that are being made."""
+
+    def state(run: StoredRun) -> str:
+        if run.finished:
+            return "finished"
+        return "running" if key_of(run) in going else "waiting" if run.status == MISSING else "failed"
+
+    made = [
+        {
+            "name": f"{run.cell.name}, run {run.number}",
+            "evaluations": going[key_of(run)].evaluations,
+            "budget": run.cell.evaluations,
+            "elapsed": going[key_of(run)].elapsed,
+        }
+        for run in sorted(summary.runs, key=lambda run: (run.number, run.cell.name))
+        if key_of(run) in going
+    ]
+    states = dict.fromkeys(("finished", "running", "waiting", "failed"), 0) | Counter(map(state, summary.runs))
+    times = {"elapsed": None, "left": None} if progress is None else {"elapsed": progress.elapsed, "left": progress.left}
+    total = {"total": len(summary.runs), **states, "alive": progress is not None, **times}
+    return {**total, "cells": cells_data(summary, state), "going": made}
 
 
 def followed(path: Path, trust: bool = False) -> Followed:

@@ -92,13 +92,10 @@ class Handler(BaseHTTPRequestHandler):
         if found is None:
             self._send(HTTPStatus.NOT_FOUND, "text/plain", b"There is no such page.\n")
             return
-        kind, content, version, packed = found
-        if version and self.headers.get("If-None-Match") == f'"{version}"':
-            self._send(HTTPStatus.NOT_MODIFIED, kind, b"", version)
-            return
+        kind, content, packed = found
         if not packed and len(content) > 1000 and "gzip" in self.headers.get("Accept-Encoding", ""):
             content, packed = _compressed(content), True
-        self._send(HTTPStatus.OK, kind, content, version, packed)
+        self._send(HTTPStatus.OK, kind, content, packed)
 
     do_HEAD = do_GET  # noqa: N815 - as http.server has it
 
@@ -112,34 +109,31 @@ class Handler(BaseHTTPRequestHandler):
         self.close_connection = True  # what it sends along is not read
         self._send(HTTPStatus.METHOD_NOT_ALLOWED, "text/plain", b"This server only answers GET and HEAD.\n")
 
-    def _found(self, path: str) -> tuple[str, bytes, str, bool] | None:
-        """Kind, content, version and whether it is compressed, of a route; None if there is none."""
+    def _found(self, path: str) -> tuple[str, bytes, bool] | None:
+        """Kind, content and whether it is compressed, of a route; None if there is none."""
         followed = self.server.followed
         if path == "/":
-            return HTML, self.server.page, "", False
+            return HTML, self.server.page, False
         if path == "/plotly.js":
-            return SCRIPT, plotly(), "", False
+            return SCRIPT, plotly(), False
         if path == "/scripts.js":
-            return SCRIPT, live_scripts(), "", False
+            return SCRIPT, live_scripts(), False
         if path == "/status.json":
-            return JSON, msgspec.json.encode(followed.status()), "", False
-        if (named := re.fullmatch(r"/(data|going|measures)\.json", path)) and (answer := followed.answer(named[1])):
-            return JSON, answer.content, answer.version, False
+            return JSON, msgspec.json.encode(followed.status()), False
+        if (named := re.fullmatch(r"/(data|going|measures)\.json", path)) and (content := followed.answer(named[1])):
+            return JSON, content, False
         if (named := re.fullmatch(r"/details/([0-9a-f-]{1,40})\.json", path)) and (content := followed.details(named[1])):
-            return JSON, content, "", True
+            return JSON, content, True
         return None
 
-    def _send(self, status: HTTPStatus, kind: str, content: bytes, version: str = "", packed: bool = False) -> None:
+    def _send(self, status: HTTPStatus, kind: str, content: bytes, packed: bool = False) -> None:
         self.send_response(status)
-        own = {"Content-Type": kind, "Cache-Control": "no-cache" if version else "no-store", **HEADERS}
-        own |= {"ETag": f'"{version}"'} if version else {}
+        own = {"Content-Type": kind, "Content-Length": str(len(content)), "Cache-Control": "no-store", **HEADERS}
         own |= {"Content-Encoding": "gzip"} if packed else {}
         own |= {"Allow": "GET, HEAD"} if status == HTTPStatus.METHOD_NOT_ALLOWED else {}
         own |= {"Connection": "close"} if self.close_connection else {}
         for name, value in own.items():
             self.send_header(name, value)
-        if status != HTTPStatus.NOT_MODIFIED:
-            self.send_header("Content-Length", str(len(content)))
         self.end_headers()
         if self.command != "HEAD":
             self.wfile.write(content)

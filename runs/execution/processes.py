@@ -19,7 +19,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -65,19 +65,7 @@ class Child:
         self._lock = threading.Lock()
 
     def perform(self, task: RunTask, report: Report | None = None) -> RunOutcome:
-        """The outcome of a run. If its process is killed from outside, the run is begun once more."""
-        outcome = self._attempt(task, report)
-        if outcome.status == KILLED and not self._closed:
-            outcome = self._attempt(task, report)
-        return outcome
-
-    def close(self) -> None:
-        """End the process now; no run can be made with it any more."""
-        with self._lock:
-            self._closed = True
-        self._end()
-
-    def _attempt(self, task: RunTask, report: Report | None) -> RunOutcome:
+        """The outcome of a run."""
         if not self._begin(task):
             return self._ended(task, 0.0)
         began = time.perf_counter()
@@ -93,6 +81,12 @@ class Child:
                 return message[1]
             if message[0] == "report" and report is not None:
                 report(*message[1:])
+
+    def close(self) -> None:
+        """End the process now; no run can be made with it any more."""
+        with self._lock:
+            self._closed = True
+        self._end()
 
     def _begin(self, task: RunTask) -> bool:
         """Send a task to the process, which is replaced if it has ended, as after a long time without tasks."""
@@ -182,63 +176,32 @@ def receive(channel: Any, put: Callable[[Any], None], last: Any) -> None:
 _own = threading.local()
 
 
-def perform_apart(task: RunTask) -> RunOutcome:
+def perform_apart(task: RunTask, report: Report | None = None) -> RunOutcome:
     """The outcome of a run in a child process, which the calling thread keeps for its next run: the function that executors call."""
     if not hasattr(_own, "child"):
         _own.child = Child()
-    return _own.child.perform(task)
+    if report is not None:
+        report(0, 0.0)
+    return _own.child.perform(task, report)
 
 
-# Workers: both kinds return futures of outcomes
-
-
-class LocalWorkers:
-    """`jobs` processes on this machine, each with a thread that watches it."""
+class LocalWorkers(ThreadPoolExecutor):
+    """An executor of threads, each with one process of this machine for its runs; `stop` ends all work now."""
 
     def __init__(self, jobs: int) -> None:
-        self._children = [Child() for _ in range(jobs)]
-        self._idle: queue.SimpleQueue[Child] = queue.SimpleQueue()
-        for child in self._children:
-            self._idle.put(child)
-        self._threads = ThreadPoolExecutor(jobs, thread_name_prefix="run")
+        super().__init__(jobs, thread_name_prefix="run", initializer=self._begin)
+        self._children: list[Child] = []
 
-    def submit(self, task: RunTask, report: Report) -> Future[RunOutcome]:
-        """The outcome of a run, in the future; `report` is called with its progress."""
-        return self._threads.submit(self._perform, task, report)
+    def _begin(self) -> None:
+        _own.child = Child()
+        self._children.append(_own.child)
 
     def stop(self) -> None:
         """End all work now."""
-        self._threads.shutdown(wait=False, cancel_futures=True)
+        self.shutdown(wait=False, cancel_futures=True)
         for child in self._children:
             child.close()
-        self._threads.shutdown()
-
-    def _perform(self, task: RunTask, report: Report) -> RunOutcome:
-        child = self._idle.get()
-        try:
-            report(0, 0.0)
-            return child.perform(task, report)
-        finally:
-            self._idle.put(child)
-
-
-class ExecutorWorkers:
-    """The workers of an executor. Each of their threads keeps one process for runs."""
-
-    def __init__(self, executor: Executor) -> None:
-        self._submit: Callable[..., Any] = executor.submit
-        self._futures: list[Any] = []
-
-    def submit(self, task: RunTask, report: Report) -> Future[RunOutcome]:
-        """The outcome of a run, in the future; `report` is not called."""
-        future = self._submit(perform_apart, task)
-        self._futures.append(future)
-        return future
-
-    def stop(self) -> None:
-        """Cancel the runs that have not begun. The executor belongs to the caller: it is not shut down, and ends the runs it has begun."""
-        for future in self._futures:
-            future.cancel()
+        self.shutdown()
 
 
 @contextmanager

@@ -136,7 +136,9 @@ class Page:
     def check(self, store: Store) -> None:
         """Raise ValueError unless a folder has all runs of the study as its file states it now."""
         store.check(self._definition)
-        different = [key for key, value in self._definition.items() if key != "cells" and store.definition.get(key) != value]
+        different = [
+            key for key, value in self._definition.items() if key not in ("cells", "objectives") and store.definition.get(key) != value
+        ]
         if different:
             raise ValueError(
                 f"page: {', '.join(different)} of the study changed after its last run; `macs study run` again takes them over, "

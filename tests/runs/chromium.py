@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import time
 from pathlib import Path
-from urllib.request import urlopen
 
 import pytest
 
@@ -45,59 +43,34 @@ def wait(browser, condition: str) -> None:
     raise AssertionError(f"not within 30 s: {condition}")
 
 
+READY = "document.documentElement.dataset.ready === 'yes'"
+"""The figures of a page are there."""
+
+
+def opened(browser, address: str) -> None:
+    """Open a page."""
+    browser.get(address)
+    wait(browser, READY)
+
+
 def errors(browser) -> list[str]:
     """What the console has, but for remarks of the driver on software rendering."""
     return [one["message"] for one in browser.get_log("browser") if one["level"] == "SEVERE" or "Violation" in one["message"]]
 
 
-def opened_alone(page: Path, settled: float = 1.0) -> tuple[float, float, list[str]]:
-    """Open a page in a new browser as its readers do: nothing listens to it meanwhile.
-
-    A driver listens to the console. Each error that a script throws then has the browser read that script again for the lines of its trace:
-    of the drawing package this takes half a second that no reader waits for. The browser has `settled` seconds to end its own start.
-    Returns the seconds until the page says that its figures are there, the seconds of processor time of its main thread until it has been
-    read and drawn, and the errors that it has thrown and not caught.
-    """
-    import websocket
-
-    marks = """
-        window.marks = { errors: [] };
-        new MutationObserver(() => { window.marks.ready ??= performance.now(); })
-            .observe(document, { subtree: true, attributes: true, attributeFilter: ["data-ready"] });
-        addEventListener("load", () => { window.marks.loaded = true; });
-        addEventListener("error", (event) => window.marks.errors.push(event.message));
-        addEventListener("unhandledrejection", (event) => window.marks.errors.push(String(event.reason)));
-        """
+def work_of(page: Path, ready: str) -> float:
+    """Seconds of processor time that the main thread of a new browser, which has compiled nothing yet, works until a condition in a page
+    holds and the page is drawn."""
     browser = started()
     try:
-        with urlopen(f"http://{browser.capabilities['goog:chromeOptions']['debuggerAddress']}/json/version") as answer:
-            connection = websocket.create_connection(json.load(answer)["webSocketDebuggerUrl"], suppress_origin=True, timeout=60)
-
-        def ask(method: str, session: str | None = None, **parameters):
-            message = {"id": 1, "method": method, "params": parameters} | ({"sessionId": session} if session else {})
-            connection.send(json.dumps(message))
-            while "id" not in (answer := json.loads(connection.recv())):
-                pass  # events
-            return answer["result"]
-
-        def value(expression: str):
-            return ask("Runtime.evaluate", session, expression=expression, returnByValue=True)["result"].get("value")
-
-        target = ask("Target.createTarget", url="about:blank", newWindow=True)["targetId"]
-        session = ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        ask("Page.enable", session)
-        ask("Performance.enable", session, timeDomain="threadTicks")
-        ask("Page.addScriptToEvaluateOnNewDocument", session, source=marks)
-        time.sleep(settled)
-        ask("Page.navigate", session, url=page.as_uri())
-        for _ in range(600):
-            if value("Boolean(window.marks?.ready && window.marks.loaded)"):
-                break
-            time.sleep(0.1)
+        browser.get("about:blank")
+        time.sleep(1.0)  # the browser ends its own start
+        browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
+        browser.get(page.as_uri())
+        wait(browser, ready)
         time.sleep(0.5)  # what is drawn in later frames
-        seconds, errors = value("[window.marks.ready / 1000, window.marks.errors]")
-        work = next(one["value"] for one in ask("Performance.getMetrics", session)["metrics"] if one["name"] == "TaskDuration")
-        connection.close()
+        assert errors(browser) == []
+        metrics = browser.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
     finally:
         browser.quit()
-    return seconds, work, errors
+    return next(one["value"] for one in metrics if one["name"] == "TaskDuration")

@@ -53,18 +53,10 @@ class Hungry(Plain):
 
 @dataclass(frozen=True)
 class Dying(Plain):
-    """Killed from outside, as for want of memory: at every attempt, or as often as there are bytes in a file that it shortens."""
-
-    lives: str = ""
+    """Killed from outside, as for want of memory."""
 
     def advance(self, state: Any, evaluator: Any, budget: int) -> None:
-        if not self.lives:
-            os.kill(os.getpid(), signal.SIGKILL)
-        left = Path(self.lives).read_bytes()
-        if left:
-            Path(self.lives).write_bytes(left[1:])
-            os.kill(os.getpid(), signal.SIGKILL)
-        super().advance(state, evaluator, budget)
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 @dataclass(frozen=True)

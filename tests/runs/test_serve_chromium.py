@@ -6,7 +6,7 @@ import threading
 import time
 
 import pytest
-from chromium import NEEDS_CHROMIUM, errors, wait
+from chromium import NEEDS_CHROMIUM, errors, opened, wait
 from misbehaving import Crashing, Gated, Plain, glide
 from test_serve import process, served, study
 from test_study import Inline
@@ -16,12 +16,6 @@ from runs import Study
 pytest.importorskip("plotly")
 webdriver = pytest.importorskip("selenium.webdriver")
 pytestmark = NEEDS_CHROMIUM
-READY = "document.documentElement.dataset.ready === 'yes'"
-
-
-def opened(browser, url: str) -> None:
-    browser.get(url)
-    wait(browser, READY)
 
 
 def others(browser) -> list[str]:

@@ -36,10 +36,10 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(scheduler, tmp_pat
     killer = threading.Thread(target=kill)
     killer.start()
     with cluster(address) as executor:
-        summary = slow().run(tmp_path / "out", executor=executor)
+        summary = slow(8).run(tmp_path / "out", executor=executor)
     killer.join()
-    assert summary.finished == slow().runs and first.wait(timeout=5) == -signal.SIGKILL
-    assert numbers(summary) == numbers(slow().run(tmp_path / "here", executor=Inline()))
+    assert summary.finished == 8 and first.wait(timeout=5) == -signal.SIGKILL
+    assert numbers(summary) == numbers(slow(8).run(tmp_path / "here", executor=Inline()))
 
 
 @pytest.mark.slow
@@ -54,12 +54,12 @@ def test_a_scheduler_that_is_killed_loses_nothing_that_is_finished(scheduler, tm
     killer.start()
     began = time.monotonic()
     with pytest.raises(WorkersLost, match="the same command continues with them"), cluster(address) as executor:
-        slow().run(tmp_path / "out", executor=executor)
+        slow(8).run(tmp_path / "out", executor=executor)
     killer.join()
     assert time.monotonic() - began < 90
     before = stamps(tmp_path)
     assert before
-    assert slow().run(tmp_path / "out", executor=Inline()).finished == slow().runs and before.items() <= stamps(tmp_path).items()
+    assert slow(8).run(tmp_path / "out", executor=Inline()).finished == 8 and before.items() <= stamps(tmp_path).items()
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "127.0.0.1:notaport"])
