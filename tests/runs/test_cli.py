@@ -10,20 +10,17 @@ import pytest
 
 import macs
 from macs import Front
+from problems import names
+from runs.batch import file as studyfile
 from runs.cli import main
 
 MACS = [sys.executable, "-m", "runs.cli"]
 SCRIPT = """
+from misbehaving import glide
 from problems import Problem
 
 def build(speed=3.0):
-    problem = Problem("glide")
-    phase = problem.phase("leg", t0=0.0, tf=(1.0, 5.0))
-    x = phase.state("x", bounds=(0, 20), initial=0, unit="km")
-    u = phase.control("u", bounds=(0, speed), unit="km/s")
-    phase.dynamics(x=u)
-    problem.minimize("time", phase.tf, unit="s")
-    problem.maximize("distance", phase.final(x), unit="km")
+    problem = glide(speed)
     problem.default_transcription = "dfet:2x2:bernstein"
     problem.default_evaluations = 40
     return problem
@@ -65,13 +62,15 @@ def broken():
 def nothing():
     return 7
 """
+STUDY = 'problems = "glide.py:build"\nsolvers = "macs"\nruns = 1\nseed = 1\n'
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "glide.py").write_text(SCRIPT, encoding="utf-8")
-    return tmp_path
+def files(here):
+    Path("glide.py").write_text(SCRIPT, encoding="utf-8")
+    Path("gliders.toml").write_text(STUDY, encoding="utf-8")
+    Path("text.nc").write_text("no front", encoding="utf-8")
+    Path("empty").mkdir()
 
 
 @pytest.fixture(scope="module")
@@ -79,21 +78,6 @@ def saved(tmp_path_factory):
     folder = tmp_path_factory.mktemp("saved")
     call = [*MACS, "solve", "goddard", "--evaluations", "60", "--seed", "1", "--out", "front.nc", "--plot", "front.png"]
     return folder, subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=120)
-
-
-def wrong(capsys, *call: str) -> str:
-    """The one line that a wrong call is answered with."""
-    before = {path.name for path in Path.cwd().iterdir()} - {"__pycache__"}
-    try:
-        code = main(call)
-    except SystemExit as end:
-        code = end.code
-    said = capsys.readouterr()
-    assert code == 2
-    assert said.out == ""
-    assert said.err.count("\n") == 1 and "Traceback" not in said.err
-    assert {path.name for path in Path.cwd().iterdir()} - {"__pycache__"} == before
-    return said.err.strip()
 
 
 # Help and lists
@@ -113,10 +97,10 @@ def test_help_is_instant():
         assert word in done.stdout
 
 
-def test_list_names_every_case_on_a_line(capsys):
+def test_list_has_a_line_for_every_case_and_every_study(capsys):
     assert main(["list"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines][:2] == ["goddard", "orbit_rise"] and all(len(line.split()) > 3 for line in lines)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert [words[0] for words in lines] == [*names(), *studyfile.names()] and all(len(words) > 3 for words in lines)
 
 
 # Solving
@@ -136,12 +120,12 @@ def test_solve_prints_defects_and_leaves_a_front_and_a_picture(saved):
 
 
 @pytest.mark.slow
-def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys):
+def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys, refused):
     assert main(["solve", "glide.py:build", "--no-refine"]) == 0
     assert main(["solve", "glide.py:build", "--no-refine", "--evaluations", "40"]) == 0
     assert "front saved in glide-2.nc" in capsys.readouterr().out
     assert Front.load("glide.nc").stats["stopped"] == "done" and Front.load("glide-2.nc").stats["evaluations"] == 40
-    assert "made by the code at" in wrong(capsys, "verify", "glide.nc")
+    assert "made by the code at" in refused("verify", "glide.nc")
     assert main(["verify", "glide.nc", "--trust"]) == 0
     assert main(["verify", "glide.nc", "--problem", "glide.py:build"]) == 0
 
@@ -265,14 +249,32 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["show", "missing.nc"], ["no file 'missing.nc'"]),
         (["show", "glide.py"], ["not a netCDF-4 file"]),
         (["verify", "missing.nc"], ["no file 'missing.nc'"]),
+        (["solve", "welded_beam", "--transcription", "dfet:4x6"], ["it takes no transcription"]),
+        (["solve", "welded_beam", "--inner", "auto"], ["it takes no inner level"]),
+        (["solve", "welded_beam", "--solver", "sweep"], ["Sweep needs derivatives"]),
+        (["solve", "welded_beam", "--polish-on", "dfet:4x3:bernstein"], ["polish_on does not apply"]),
+        (["study", "status", "nowhere"], ["macs study status: there is no folder 'nowhere'"]),
+        (["study", "run", "gliderz"], ["unknown study 'gliderz'"]),
+        (["study", "run", "goddard-table-3"], ["did you mean goddard-table3?"]),
+        (["study", "run", "nothing.toml"], ["there is no file 'nothing.toml'"]),
+        (["study", "run", "gliders.toml", "--jobs", "2", "--dask", "tcp://localhost:1"], ["give one of them"]),
+        (["study", "run", "--solvers", "MACS", "goddard-table3"], ["write them before --solvers"]),
+        (["study", "run", "gliders.toml", "--trust", "--solvers", "others"], ["unknown solver 'others'"]),
+        (["study", "run", "gliders.toml", "--trust", "--runs", "0"], ["not a whole number above 0"]),
+        (["study", "run", "gliders.toml", "--job", "2"], ["did you mean --jobs?"]),
+        (["study", "run", "gliders.toml", "--trust", "--out", "."], ["contains no study but other things"]),
+        *(([command, name], [name]) for command in ("report", "serve") for name in ("missing.nc", "text.nc", "empty")),
+        (["report", "text.nc", "--html", "none/page.html"], ["there is no folder"]),
+        (["report", "text.nc", "--html", "page.nc"], ["ends with .html"]),
+        *((["serve", "gliders.toml", "--port", port], ["is not a port"]) for port in ("70000", "-1", "http")),
         (["sovle"], ["'sovle'", "solve"]),
         (["list", "everything"], ["'everything'"]),
         ([], ["COMMAND"]),
     ],
 )
-def test_a_wrong_call_is_answered_in_one_line(capsys, call, words):
-    line = wrong(capsys, *call)
-    assert line.startswith("macs") and all(word in line for word in words), line
+def test_a_wrong_call_is_answered_in_one_line(refused, call, words):
+    line = refused(*call)
+    assert all(word in line for word in words), line
 
 
 def test_a_wrong_call_in_a_process(here):
@@ -332,7 +334,7 @@ def test_kill_ends_what_ignores_ctrl_c():
 
 
 @pytest.mark.slow
-def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, monkeypatch):
+def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, refused, monkeypatch):
     call = ["solve", "glide.py:build", "--evaluations", "150", "--seed", "1"]
     assert main([*call, "--out", "whole.nc"]) == 0
     whole = Front.load("whole.nc")
@@ -348,7 +350,7 @@ def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, monkeypatch):
         assert main([*call, "--checkpoint", "run.ckpt", "--out", "part.nc"]) == 130
     assert Path("run.ckpt").exists() and not Path("part.nc").exists()
     capsys.readouterr()
-    assert "seed is 1 there, 2 here" in wrong(capsys, *call[:-1], "2", "--checkpoint", "run.ckpt")
+    assert "seed is 1 there, 2 here" in refused(*call[:-1], "2", "--checkpoint", "run.ckpt")
     assert main([*call, "--checkpoint", "run.ckpt", "--out", "rest.nc"]) == 0
     rest = Front.load("rest.nc")
     assert rest.F.tobytes() == whole.F.tobytes() and rest.decision.tobytes() == whole.decision.tobytes()
@@ -367,7 +369,7 @@ def test_show_prints_draws_and_exports(saved, capsys):
 
 
 @pytest.mark.slow
-def test_show_one_point(saved, capsys):
+def test_show_one_point(saved, capsys, refused):
     path = str(saved[0] / "front.nc")
     assert main(["show", path, "--point", "-1", "--plot", "b.png", "--costates", "--csv", "b.csv"]) == 0
     out = capsys.readouterr().out
@@ -377,26 +379,26 @@ def test_show_one_point(saved, capsys):
     assert Path("b.png").read_bytes().startswith(b"\x89PNG") and len(Path("b.csv").read_text().splitlines()) == 1 + len(
         Front.load(path)[-1].trajectory["ascent"].time
     )
-    assert "--costates is for the picture of a trajectory" in wrong(capsys, "show", path, "--costates", "--plot", "c.png")
-    assert "there is no point 99: the front has points 0 to" in wrong(capsys, "show", path, "--point", "99")
+    assert "--costates is for the picture of a trajectory" in refused("show", path, "--costates", "--plot", "c.png")
+    assert "there is no point 99: the front has points 0 to" in refused("show", path, "--point", "99")
 
 
 @pytest.mark.slow
-def test_verify_says_which_point_fails_and_why(saved, capsys):
+def test_verify_says_which_point_fails_and_why(saved, capsys, refused):
     path = str(saved[0] / "front.nc")
     assert main(["verify", path, "--tolerance", "10"]) == 0
     assert "points verify" in capsys.readouterr().out
     assert main(["verify", path, "--tolerance", "1e-13", "--rtol", "1e-9"]) == 1
     out = capsys.readouterr().out
     assert "FAILS" in out and ": simulated, it ends" in out
-    assert "belongs to problem 'goddard'" in wrong(capsys, "verify", path, "--problem", "orbit_rise")
+    assert "belongs to problem 'goddard'" in refused("verify", path, "--problem", "orbit_rise")
 
 
-def test_a_result_overwrites_no_file_of_another_kind(capsys, tmp_path, monkeypatch):
+def test_a_result_overwrites_no_file_of_another_kind(capsys, refused, tmp_path, monkeypatch):
     monkeypatch.setattr("macs.solvers.solver.Solver.solve", lambda *_, **__: pytest.fail("the work started"))
     source = tmp_path / "mine.py"
     source.write_text("print('mine')\n", encoding="utf-8")
-    assert "would overwrite a file that is no front" in wrong(capsys, "solve", "goddard", "--out", str(source))
+    assert "would overwrite a file that is no front" in refused("solve", "goddard", "--out", str(source))
     assert source.read_text(encoding="utf-8") == "print('mine')\n"
     same = str(tmp_path / "q.png")
-    assert "would overwrite the front" in wrong(capsys, "solve", "goddard", "--out", same, "--plot", same)
+    assert "would overwrite the front" in refused("solve", "goddard", "--out", same, "--plot", same)

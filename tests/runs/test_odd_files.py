@@ -6,16 +6,13 @@ from pathlib import Path
 import pytest
 
 from problems import load
-from runs.cli import main
 from runs.measures.references import read
 
 KINDS = ("pipe", "device", "folder", "circle of links")
 SOLVE = ("solve", "four_bar_truss", "--seed", "1", "--evaluations", "40")
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("here")
 
 
 def odd(name, kind):
@@ -31,14 +28,8 @@ def odd(name, kind):
     return name
 
 
-def refused(capsys, *call):
-    assert main(list(call)) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    return line
-
-
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_is_read_is_an_ordinary_file(capsys, kind):
+def test_what_is_read_is_an_ordinary_file(refused, kind):
     for suffix, call in (
         (".py", ("solve", "odd.py:build")),
         (".json", (*SOLVE, "--prefer", "odd.json", "--out", "front.nc")),
@@ -50,31 +41,31 @@ def test_what_is_read_is_an_ordinary_file(capsys, kind):
         name = f"odd{suffix}"
         if not os.path.lexists(name):
             odd(name, kind)
-        line = refused(capsys, *call)
+        line = refused(*call)
         assert name in line and any(why in line for why in ("no ordinary file", "Is a directory", "symbolic links"))
     assert not Path("front.nc").exists()
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_record_of_a_study_is_an_ordinary_file(capsys, kind):
+def test_the_record_of_a_study_is_an_ordinary_file(refused, kind):
     Path("study").mkdir()
     Path("study/study.json").symlink_to(Path.cwd() / odd("odd", kind))
     for action in ("status", "report"):
-        assert "'study' cannot be read" in refused(capsys, "study", action, "study")
+        assert "'study' cannot be read" in refused("study", action, "study")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_is_written_is_an_ordinary_file(capsys, kind):
+def test_what_is_written_is_an_ordinary_file(refused, kind):
     odd("odd.png", kind)
     for option in ("--out", "--plot", "--checkpoint"):
         given = {"--out": "front.nc"} | {option: "odd.png"}
-        line = refused(capsys, *SOLVE, *(word for pair in given.items() for word in pair))
+        line = refused(*SOLVE, *(word for pair in given.items() for word in pair))
         assert "cannot write 'odd.png'" in line and not Path("front.nc").exists()
 
 
-def test_the_folder_of_a_study_is_no_circle_of_links(capsys):
+def test_the_folder_of_a_study_is_no_circle_of_links(refused):
     odd("study", "circle of links")
-    assert "'study' is not a folder" in refused(capsys, "study", "run", "aerocapture-front", "--quick", "--out", "study")
+    assert "'study' is not a folder" in refused("study", "run", "aerocapture-front", "--quick", "--out", "study")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -83,7 +74,7 @@ def test_a_table_is_an_ordinary_file(kind):
         read(odd("odd.csv", kind), load("four_bar_truss").compile().goals)
 
 
-def test_a_file_with_a_problem_has_a_size(capsys):
+def test_a_file_with_a_problem_has_a_size(refused):
     with Path("large.py").open("wb") as file:
         file.truncate(2**30)
-    assert "'large.py' has 1073741824 bytes" in refused(capsys, "solve", "large.py:build")
+    assert "'large.py' has 1073741824 bytes" in refused("solve", "large.py:build")

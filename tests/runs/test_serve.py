@@ -27,7 +27,6 @@ from runs.batch.running import PROGRESS_FILE, STALE, StudyDisplay, read_progress
 from runs.batch.store import Store
 from runs.browser.live import followed
 from runs.browser.server import Server
-from runs.cli import main
 from runs.execution.task import ArchiveSamples
 
 pytest.importorskip("plotly")
@@ -300,26 +299,10 @@ def test_fronts_are_followed_one_alone_and_those_of_a_folder(tmp_path):
         assert "text.nc" in data["unreadable"][0]
 
 
-def test_wrong_calls_are_one_line(out, tmp_path, capsys):
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "text.nc").write_text("no front", encoding="utf-8")
-    taken = Server(followed(out))
-    calls = (
-        [str(tmp_path / "nothing")],
-        [str(tmp_path / "empty")],
-        [str(tmp_path / "text.nc")],
-        [str(out), "--port", str(taken.server_address[1])],
-        [str(out), "--host", "999.1.1.1"],
-        [str(out), "--host", "192.0.2.1"],
-    )
-    for call in calls:
-        assert main(["serve", *call]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
-    taken.server_close()
-    for port in ("70000", "-1", "http"):
-        with pytest.raises(SystemExit, match="2"):
-            main(["serve", str(out), "--port", port])
-        assert capsys.readouterr().err.count("\n") == 1
+def test_an_address_that_cannot_be_had_is_one_line(out, refused):
+    with served(out) as client:
+        for words in (("--port", str(client.server.server_address[1])), ("--host", "999.1.1.1"), ("--host", "192.0.2.1")):
+            assert words[1] in refused("serve", str(out), *words)
 
 
 @contextmanager

@@ -69,19 +69,6 @@ def endless() -> Problem:
     return problem
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"evaluations": "auto"}, r"shooting:5, nsga2: evaluations 'auto' is for MACS; state a number, if need be in terms of 'nsga2'"),
-        ({"evaluations": "many"}, "evaluations must be a whole number or 'auto', not 'many'"),
-        ({"evaluations": None, "problems": endless()}, "problem 'glide' has no number of its own: state one, or 'auto' for MACS"),
-    ],
-)
-def test_budgets_that_cannot_be(given, message):
-    with pytest.raises(ValueError, match=message):
-        study(**given)
-
-
 def test_quick_studies_keep_the_terms():
     quick = study(terms={"macs": {**APART["macs"], "evaluations": 9000}}, evaluations=60_000).quick()
     assert {cell.labels[2]: cell.evaluations for cell in quick.cells} == {"macs": 75, "nsga2": 500}
@@ -91,29 +78,32 @@ def test_quick_studies_keep_the_terms():
 
 
 @pytest.mark.parametrize(
-    ("terms", "message"),
+    ("terms", "message", "others"),
     [
-        ([], "terms must be a table of tables"),
-        ({"mac": {"inner": "ipopt"}}, "terms: there is no solver 'mac'; there are macs, nsga2"),
-        ({"macs": {}}, "terms of 'macs': it must be a table with transcription, evaluations, inner, start"),
-        ({"macs": {"budget": 3}}, "terms of 'macs': .*'budget'"),
-        ({"macs": {"evaluations": 0}}, "terms of 'macs': evaluations must be"),
-        ({"macs": {"evaluations": {"glyde": 40}}}, "terms of 'macs': evaluations: there is no problem 'glyde'"),
-        ({"macs": {"evaluations": {"glide": 0}}}, "terms of 'macs': evaluations of 'glide' must be"),
-        ({"macs": {"inner": "outer"}}, "terms of 'macs': .*inner level 'outer'"),
-        ({"macs": {"start": "soft"}}, "terms of 'macs': unknown start 'soft'"),
-        ({"macs": {"start": 3}}, "terms of 'macs': start must be 'uniform', 'smooth'"),
-        ({"macs": {"start": {"spread": 2.0}}}, "spread must be in"),
-        ({"macs": {"transcription": ["dfet:2x2"]}}, "terms of 'macs': transcription must be one"),
-        ({"macs": {"transcription": {"glide": ["dfet:2x2"]}}}, "terms of 'macs': transcription must be one, or one for each problem"),
-        ({"macs": {"transcription": {"glyde": "dfet:2x2"}}}, "terms of 'macs': transcription: there is no problem 'glyde'"),
-        ({"macs": {"transcription": {"glide": "dfet"}}}, "terms of 'macs': transcriptions: unknown transcription 'dfet'"),
-        ({"macs": {"transcription": "dfet:2"}}, "dfet"),
+        ({}, "shooting:5, nsga2: evaluations 'auto' is for MACS; state a number, if need be in terms of 'nsga2'", {"evaluations": "auto"}),
+        ({}, "evaluations must be a whole number or 'auto', not 'many'", {"evaluations": "many"}),
+        ({}, "'glide' has no number of its own: state one, or 'auto' for MACS", {"evaluations": None, "problems": endless()}),
+        ([], "terms must be a table of tables", {}),
+        ({"mac": {"inner": "ipopt"}}, "terms: there is no solver 'mac'; there are macs, nsga2", {}),
+        ({"macs": {}}, "terms of 'macs': it must be a table with transcription, evaluations, inner, start", {}),
+        ({"macs": {"budget": 3}}, "terms of 'macs': .*'budget'", {}),
+        ({"macs": {"evaluations": 0}}, "terms of 'macs': evaluations must be", {}),
+        ({"macs": {"evaluations": {"glyde": 40}}}, "terms of 'macs': evaluations: there is no problem 'glyde'", {}),
+        ({"macs": {"evaluations": {"glide": 0}}}, "terms of 'macs': evaluations of 'glide' must be", {}),
+        ({"macs": {"inner": "outer"}}, "terms of 'macs': .*inner level 'outer'", {}),
+        ({"macs": {"start": "soft"}}, "terms of 'macs': unknown start 'soft'", {}),
+        ({"macs": {"start": 3}}, "terms of 'macs': start must be 'uniform', 'smooth'", {}),
+        ({"macs": {"start": {"spread": 2.0}}}, "spread must be in", {}),
+        ({"macs": {"transcription": ["dfet:2x2"]}}, "terms of 'macs': transcription must be one", {}),
+        ({"macs": {"transcription": {"glide": ["dfet:2x2"]}}}, "terms of 'macs': transcription must be one, or one for each problem", {}),
+        ({"macs": {"transcription": {"glyde": "dfet:2x2"}}}, "terms of 'macs': transcription: there is no problem 'glyde'", {}),
+        ({"macs": {"transcription": {"glide": "dfet"}}}, "terms of 'macs': transcriptions: unknown transcription 'dfet'", {}),
+        ({"macs": {"transcription": "dfet:2"}}, "dfet", {}),
     ],
 )
-def test_terms_that_make_no_sense_are_refused(terms, message):
+def test_terms_and_budgets_that_make_no_sense_are_refused(terms, message, others):
     with pytest.raises(ValueError, match=message):
-        study(terms=terms)
+        study(terms=terms, **others)
 
 
 # What a case has of its own

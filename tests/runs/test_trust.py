@@ -24,12 +24,11 @@ TOML = 'solvers = ["macs"]\nruns = 1\nseed = 1\nevaluations = 50\n'
 
 
 @pytest.fixture
-def mark(tmp_path, monkeypatch) -> Path:
+def mark(here, monkeypatch) -> Path:
     """A file that exists as soon as code that only a file names has run; that code can be imported, and lies here."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    found = tmp_path / "it_ran"
-    (tmp_path / "evil.py").write_text(MARK.format(mark=str(found)), encoding="utf-8")
+    monkeypatch.syspath_prepend(here)
+    found = here / "it_ran"
+    (here / "evil.py").write_text(MARK.format(mark=str(found)), encoding="utf-8")
     return found
 
 
@@ -48,14 +47,6 @@ def out(made, tmp_path) -> Path:
     return Path(shutil.copytree(made, tmp_path / "out"))
 
 
-def refused(capsys, *call: str) -> str:
-    """The one line with which a call is refused."""
-    assert main([*call]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    return said
-
-
 ADDRESSES = ("evil.py:build", "evil:build", "os:system", "problems.cases.goddard:load", "problems.catalogue:load")
 
 
@@ -71,9 +62,9 @@ ADDRESSES = ("evil.py:build", "evil:build", "os:system", "problems.cases.goddard
         'problems = "goddard"\nreference = {{goddard = "{}"}}',
     ],
 )
-def test_a_study_file_runs_no_code_of_its_own(mark, capsys, address, key):
+def test_a_study_file_runs_no_code_of_its_own(mark, refused, address, key):
     Path("study.toml").write_text(f"{key.format(address)}\n{TOML}", encoding="utf-8")
-    said = refused(capsys, "study", "run", "study.toml")
+    said = refused("study", "run", "study.toml")
     assert f"study.toml: it names '{address}'" in said and "--trust" in said
     with pytest.raises(ValueError, match="trust=True"):
         Study.load("study.toml")
@@ -94,7 +85,7 @@ def test_the_catalogue_needs_no_trust():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("address", ADDRESSES)
-def test_a_run_file_runs_no_code_of_its_own(mark, out, capsys, address):
+def test_a_run_file_runs_no_code_of_its_own(mark, out, refused, address):
     path = next(out.rglob("*.nc"))
     front = Front.load(path)
     front.source = ProblemSource(front.source.name, front.source.fingerprint, address, {"command": "touch it_ran"})
@@ -103,20 +94,18 @@ def test_a_run_file_runs_no_code_of_its_own(mark, out, capsys, address):
     forged = {**from_record(record.read_bytes()), "front": crc32(path.read_bytes()), "simulated": {}}
     record.write_bytes(to_record(forged))
     assert main(["study", "status", str(out)]) == 0
-    capsys.readouterr()
-    said = refused(capsys, "study", "report", str(out), "--no-figures")
+    said = refused("study", "report", str(out), "--no-figures")
     assert f"names '{address}'" in said and "--trust" in said and not mark.exists()
 
 
 @pytest.mark.parametrize("reference", [*ADDRESSES, {"goddard": "evil:reference"}])
-def test_a_definition_runs_no_code_of_its_own(mark, out, capsys, reference):
+def test_a_definition_runs_no_code_of_its_own(mark, out, refused, reference):
     path = out / "study.json"
     content = from_record(path.read_bytes())
     content["study"]["reference"] = reference
     path.write_bytes(to_record(content))
     assert main(["study", "status", str(out)]) == 0
-    capsys.readouterr()
-    assert "--trust" in refused(capsys, "study", "report", str(out), "--no-figures") and not mark.exists()
+    assert "--trust" in refused("study", "report", str(out), "--no-figures") and not mark.exists()
 
 
 @pytest.mark.parametrize(
@@ -136,7 +125,7 @@ def test_a_definition_runs_no_code_of_its_own(mark, out, capsys, reference):
         ("0001.json", ("front",), None),
     ],
 )
-def test_a_forged_record_is_one_line_or_an_unreadable_run(mark, out, capsys, name, path, value):
+def test_a_forged_record_is_one_line_or_an_unreadable_run(mark, out, refused, name, path, value):
     for file in out.rglob(name):
         content = from_record(file.read_bytes())
         inner = content
@@ -144,7 +133,7 @@ def test_a_forged_record_is_one_line_or_an_unreadable_run(mark, out, capsys, nam
             inner = inner[key]
         inner[path[-1]] = value
         file.write_bytes(to_record(content))
-    said = refused(capsys, "study", "report", str(out), "--no-figures")
+    said = refused("study", "report", str(out), "--no-figures")
     assert "Traceback" not in said and ("study.json" in said or "goal" in said or "0 of 2 runs finished" in said)
 
 

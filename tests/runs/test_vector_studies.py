@@ -39,9 +39,8 @@ def build(far: float = 2.0):
 
 
 @pytest.fixture
-def mine(tmp_path, monkeypatch) -> str:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.py").write_text(MINE)
+def mine(here) -> str:
+    (here / "mine.py").write_text(MINE)
     return "mine.py:build"
 
 
@@ -119,8 +118,7 @@ _of_a_script.__module__ = "__main__"
 
 
 @pytest.mark.slow
-def test_the_command_line_solves_shows_verifies_and_chooses(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_the_command_line_solves_shows_verifies_and_chooses(here, capsys):
     assert main(["solve", "welded_beam", "--evaluations", "600", "--seed", "1", "--out", "beam.nc", "--plot", "beam.png"]) == 0
     assert "evaluated again, nothing differs by more than 1e-06" in capsys.readouterr().out
     front = Front.load("beam.nc")
@@ -139,22 +137,6 @@ def test_the_command_line_solves_shows_verifies_and_chooses(tmp_path, monkeypatc
     assert json.loads(Path("choice.json").read_text())
     assert main(["decide", "beam.nc", "--reference", "cost=8", "--problem", "welded_beam"]) == 2
     assert "'welded beam' is a vector problem" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--transcription", "dfet:4x6"], "it takes no transcription"),
-        (["--inner", "auto"], "it takes no inner level"),
-        (["--solver", "sweep"], "Sweep needs derivatives"),
-        (["--polish-on", "dfet:4x3:bernstein"], "polish_on does not apply"),
-    ],
-)
-def test_options_for_trajectories_are_refused_in_one_line(options, message, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["solve", "welded_beam", *options]) == 2
-    found = capsys.readouterr().err
-    assert message in found and found.count("\n") == 1 and not list(tmp_path.iterdir())
 
 
 def test_a_study_of_problems_of_pymoo(tmp_path):
