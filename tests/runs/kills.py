@@ -119,7 +119,7 @@ def interrupted_once(out: Path, rng: np.random.Generator) -> int:
     child.start()
     _grouped(child)
     child.join(rng.uniform(0.0, 5.0))
-    workers = _children(child.pid)
+    workers = children(child.pid)
     if workers and rng.random() < 0.3:
         os.kill(int(rng.choice(workers)), signal.SIGKILL)
         child.join(rng.uniform(0.0, 2.0))
@@ -142,7 +142,8 @@ def _patiently(work: Callable[[], Any]) -> Any:
             time.sleep(0.1)
 
 
-def _children(pid: int) -> list[int]:
+def children(pid: int) -> list[int]:
+    """The processes that a process has started."""
     try:
         return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     except OSError:

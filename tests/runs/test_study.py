@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kills import children
 from misbehaving import Crashing, Dying, Faltering, Hanging, Hungry, Plain, Slow, glide
 
 from runs import Study
@@ -264,10 +265,6 @@ def wait_for(condition, seconds: float = 60.0) -> None:
         time.sleep(0.02)
 
 
-def workers_of(pid: int) -> list[int]:
-    return [int(word) for word in subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True).stdout.split()]
-
-
 def alive(pid: int) -> bool:
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
@@ -283,7 +280,7 @@ def test_a_study_that_is_ended_takes_its_workers_along_and_keeps_what_is_finishe
     wait_for(lambda: len(stamps(tmp_path)) >= 1)
     with pytest.raises(ValueError, match="another process"):  # while the first one lives
         slow().run(tmp_path / "out")
-    workers = workers_of(coordinator.pid)
+    workers = children(coordinator.pid)
     coordinator.send_signal(getattr(signal, number))
     _, said = coordinator.communicate(timeout=20)
     assert ("KeyboardInterrupt" in said) == (number == "SIGINT")
