@@ -118,7 +118,7 @@ class StudyDisplay(Display):
             self._finished += 1
         else:
             self._failed += 1
-            self.say(f"{self._title}: run {run.number} of {run.cell.name} {reason(outcome.status, outcome.message)}")
+            self.say(f"{self._title}: run {run.number} of {run.cell.name} {reason(outcome)}")
 
     def going(self) -> tuple[list[RunProgress], float | None]:
         """The runs that are being made, and the seconds that the rest takes if it goes on like this; None if that is not known yet."""

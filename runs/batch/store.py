@@ -16,7 +16,7 @@ import json
 import os
 import socket
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -35,7 +35,7 @@ from macs.fronts.files import LARGEST_FRONT
 from macs.io.atomic import read_whole, write_whole
 from macs.io.text import duration, html_block, html_table, text_table
 
-from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, History, RunOutcome, SimulationRecord, samples_path
+from ..execution.task import FINISHED, History, RunOutcome, SimulationRecord, samples_path
 from ..files import Count, Natural, Positive, checked, errors_begin_with, load_front, read_record, to_record
 from .cells import Cell
 
@@ -93,6 +93,11 @@ class StoredRun:
         """Whether it has a front."""
         return self.status == FINISHED
 
+    @property
+    def state(self) -> str:
+        """Whether it is "finished", "missing" or "failed"."""
+        return self.status if self.status in (FINISHED, MISSING) else "failed"
+
     @cached_property
     def front(self) -> Front:
         """Its front, read at first use. Raises ValueError or FileNotFoundError if it cannot be read."""
@@ -124,7 +129,7 @@ class StudySummary:
     @property
     def failed(self) -> int:
         """Runs that ended without one, or whose front cannot be read."""
-        return self.count(CRASHED, TIMEOUT, MEMORY, KILLED, UNREADABLE)
+        return len(self.runs) - self.finished - self.missing
 
     @property
     def missing(self) -> int:
@@ -152,12 +157,10 @@ class StudySummary:
         """A row for each cell, and why runs failed, of which not too many are named."""
         rows, reasons = [], []
         for cell, runs in self.cells.items():
-            times = [run.wall_time for run in runs if run.finished and run.wall_time]
-            counts = Counter("finished" if run.finished else "missing" if run.status == MISSING else "failed" for run in runs)
-            median = duration(float(np.median(times))) if times else "-"
-            rows.append([*cell.labels, *(str(counts[kind]) for kind in ("finished", "failed", "missing")), median])
-            failed = (run for run in runs if not run.finished and run.status != MISSING)
-            reasons += [f"run {run.number} of {cell.name}: {reason(run.status, run.message)}"[:200] for run in failed]
+            counts, median = Counter(run.state for run in runs), median_time(runs)
+            kinds = [str(counts[kind]) for kind in ("finished", "failed", "missing")]
+            rows.append([*cell.labels, *kinds, "-" if median is None else duration(median)])
+            reasons += [f"run {run.number} of {cell.name}: {reason(run)}"[:200] for run in runs if run.state == "failed"]
         more = [f"and {len(reasons) - 20} more"] if len(reasons) > 20 else []
         return rows, [*reasons[:20], *more]
 
@@ -330,9 +333,15 @@ def _difference(one: Mapping[str, Any], other: Mapping[str, Any], place: str = "
     return ""
 
 
-def reason(status: str, message: str) -> str:
+def reason(run: StoredRun | RunOutcome) -> str:
     """crashed: ValueError: no such thing."""
-    return f"{status}: {message}" if message else status
+    return f"{run.status}: {run.message}" if run.message else run.status
+
+
+def median_time(runs: Sequence[StoredRun]) -> float | None:
+    """Median seconds of finished runs; None if it is not known."""
+    times = [run.wall_time for run in runs if run.finished and run.wall_time]
+    return float(np.median(times)) if times else None
 
 
 @contextmanager

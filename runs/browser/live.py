@@ -21,7 +21,7 @@ from problems.compiled import Objective
 
 from ..batch.cells import Cell
 from ..batch.running import ProgressRecord, read_progress
-from ..batch.store import MISSING, Store, StoredRun, StudySummary
+from ..batch.store import Store, StoredRun, StudySummary
 from ..execution.task import History, samples_path
 from ..files import checked, read_record
 from ..report.comparison import compared, comparisons
@@ -332,9 +332,7 @@ def _state(summary: StudySummary, progress: ProgressRecord | None, going: Mappin
     """How many runs of each cell there are in which state, and the runs that are being made."""
 
     def state(run: StoredRun) -> str:
-        if run.finished:
-            return "finished"
-        return "running" if key_of(run) in going else "waiting" if run.status == MISSING else "failed"
+        return "running" if key_of(run) in going else {"missing": "waiting"}.get(run.state, run.state)
 
     made = [
         {

@@ -14,7 +14,7 @@ from macs.front import Front
 from macs.io.atomic import check_target, write_whole
 from problems.compiled import Objective
 
-from ..batch.store import MISSING, Store, StoredRun, StudySummary, reason
+from ..batch.store import Store, StoredRun, StudySummary, median_time, reason
 from ..measures.attainment import attainment, band, staircase
 from ..measures.indicators import minimised, pieces, truth
 from ..measures.references import Reference
@@ -88,34 +88,25 @@ def study_page(store: Store, progress: bool = False) -> bytes:
         one = {"name": comparison.name, "goals": goals, "solvers": solvers, "runs": runs}
         shown.append(one | measured_data(comparison, store.definition))
     total = {"total": len(summary.runs), "finished": summary.finished, "failed": summary.failed}
-    progressed = {**total, "cells": cells_data(summary, run_state), "failures": failures_data(summary)}
+    progressed = {**total, "cells": cells_data(summary, lambda run: run.state), "failures": failures_data(summary)}
     head = {"title": summary.name, "kind": "study", "note": with_count(store.definition.get("note", ""), store.definition)}
     tables = tables_data(tables_across(found, store.definition))
     return page(head | {"progress": progressed, "comparisons": shown, "tables": tables}, blocks)
-
-
-def run_state(run: StoredRun) -> str:
-    """Whether a run is finished, missing or failed."""
-    return "finished" if run.finished else "missing" if run.status == MISSING else "failed"
 
 
 def cells_data(summary: StudySummary, state: Callable[[StoredRun], str]) -> list[dict[str, Any]]:
     """How many runs of each cell there are in which state, a function of the run, and their median time."""
     cells = []
     for cell, runs in summary.cells.items():
-        times = [run.wall_time for run in runs if run.finished and run.wall_time]
         states = {**dict.fromkeys(("finished", "missing", "running", "waiting", "failed"), 0), **Counter(map(state, runs))}
-        cells.append({"labels": list(cell.labels), **states, "time": float(np.median(times)) if times else None})
+        cells.append({"labels": list(cell.labels), **states, "time": median_time(runs)})
     return cells
 
 
 def failures_data(summary: StudySummary) -> list[dict[str, str]]:
     """Why runs failed, with the traceback of at most 200 of them."""
-    failed = [run for run in summary.runs if run_state(run) == "failed"]
-    return [
-        {"name": f"run {run.number} of {run.cell.name}", "reason": reason(run.status, run.message), "traceback": run.traceback}
-        for run in failed[:200]
-    ]
+    failed = [run for run in summary.runs if run.state == "failed"]
+    return [{"name": f"run {run.number} of {run.cell.name}", "reason": reason(run), "traceback": run.traceback} for run in failed[:200]]
 
 
 def measured_data(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Any]:
