@@ -136,7 +136,7 @@ def test_a_folder_that_is_written_is_refused_to_others(store):
     ("changes", "words"),
     [
         ({"seed": 2}, "seed is 1 there and 2 here"),
-        ({"start": {"spread": 0.1}}, "start is null there and {"),
+        ({"start": "uniform"}, 'start is null there and "uniform" here'),
         ({"evaluations": 61}, "evaluations is 60 there and 61 here"),
         ({"solvers": {"small": NSGA2(population=4)}}, "large' is there but not here"),
         (
