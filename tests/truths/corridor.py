@@ -68,7 +68,7 @@ def apoapsis(speed: float, path_angle: float) -> float:
 
 def above_target(entry_angle: float, ballistic: float, lift: float) -> float:
     """How far the apoapsis is above the target, m, with constant lift; far above if it escapes, far below if it does not leave the air."""
-    end, _ = planar(entry_angle, ballistic, lambda _: lift, floor=-50e3)  # the paper's air goes on below the ground
+    end, _ = planar(entry_angle, ballistic, lambda _: lift, floor=-50e3)  # steep ones dip below the ground
     return -1e6 if end is None else min(apoapsis(end[1], end[2]) - TARGET, 1e6)
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import radians
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import RK45
@@ -234,7 +234,7 @@ def _solved_lift(capsule: Capsule, cases: Cases) -> np.ndarray:
     # At `low` the apoapsis is below the target, or the case is lost: infinite. At `high` it is above.
     low, high, below, above = (np.full(k, np.nan) for _ in range(4))
     upward, strides, last = np.full(k, start), np.full(k, STRIDE), np.zeros(k)
-    (active,) = _only(slice(None), np.arange(k))
+    active = np.arange(k)
     for _ in range(TRIALS):
         trial = upward[active]
         exits = fly(capsule, cases[active], _constant(trial))
@@ -242,7 +242,7 @@ def _solved_lift(capsule: Capsule, cases: Cases) -> np.ndarray:
         excess = np.where(np.isnan(excess), np.inf, excess)
         under = excess > 0.0
         done = (np.abs(excess) <= near) | (under & (trial >= most)) | (~under & (trial <= -most))
-        active, trial, excess, under = _only(~done, active, trial, excess, under)
+        active, trial, excess, under = active[~done], trial[~done], excess[~done], under[~done]
         if not len(active):
             return upward
         side = np.where(under, 1.0, -1.0)
@@ -262,6 +262,21 @@ def _solved_lift(capsule: Capsule, cases: Cases) -> np.ndarray:
     raise RuntimeError(f"no constant bank found in {TRIALS} flights for {len(active)} of {k} cases")
 
 
+class _Steps(NamedTuple):
+    """Steps of some cases: states (4, m), altitude, speed, path angle and heat load, with their rates, at the beginning; times and lengths
+    of the steps (m,); which of the cases they are; states at the end."""
+
+    states: np.ndarray
+    rates: np.ndarray
+    times: np.ndarray
+    lengths: np.ndarray
+    rows: np.ndarray
+    ends: np.ndarray
+
+    def only(self, which: np.ndarray) -> _Steps:
+        return _Steps(*(values[..., which] for values in self))
+
+
 def fly(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
     """The way of each case through the air, from the interface until it leaves it or is lost: below `FLOOR`, or too slow to rise again.
 
@@ -269,42 +284,43 @@ def fly(capsule: Capsule, cases: Cases, lift: Lift) -> Exits:
     """
     k = len(cases)
     motion = _Motion(capsule, MARS.density * cases.density, capsule.ballistic * cases.ballistic, lift)
-    rows, times, steps = _only(slice(None), np.arange(k), np.zeros(k), np.full(k, FIRST))
-    states: np.ndarray = np.zeros((4, k))
-    states[0], states[1], states[2] = MARS.interface, capsule.entry_speed, capsule.entry_angle + cases.entry_angle
-    # Steps in which cases are level, and in which they leave the air.
-    level: list[tuple[np.ndarray, ...]] = []
-    last: list[tuple[np.ndarray, ...]] = []
+    begin = np.stack([np.full(k, MARS.interface), np.full(k, capsule.entry_speed), capsule.entry_angle + cases.entry_angle, np.zeros(k)])
+    rows, times = np.arange(k), np.zeros(k)
+    steps = _Steps(begin, motion.rates(begin, times, rows), times, np.full(k, FIRST), rows, begin)
+    level: list[_Steps] = []
+    last: list[_Steps] = []
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        slopes = motion.rates(states, times, rows)
         for _ in range(STEPS):
-            ends, end_slopes, error = motion.step(states, slopes, times, steps, rows)
+            ends, end_rates, error = motion.step(steps, steps.lengths)
+            steps = steps._replace(ends=ends)
             good = error <= 1.0
             out = good & (ends[0] >= MARS.interface)
-            for which, kept in ((good & (states[2] < 0.0) & (ends[2] >= 0.0), level), (out, last)):
-                if which.any():
-                    kept.append(_only(which, states, ends, slopes, times, steps, rows))
-            stays = ~(out | (good & motion.lost(ends)))
-            states, slopes = np.where(good, ends, states), np.where(good, end_slopes, slopes)
-            times = np.where(good, times + steps, times)
+            level.append(steps.only(good & (steps.states[2] < 0.0) & (ends[2] >= 0.0)))
+            last.append(steps.only(out))
             # An error that is no number: of a step that is far too long.
             factor = np.where(np.isfinite(error), 0.9 * np.maximum(error, 1e-10) ** -0.2, 0.2)
-            steps = np.minimum(steps * np.clip(factor, 0.2, 5.0), LONGEST)
-            if not stays.all():
-                states, slopes, times, steps, rows = _only(stays, states, slopes, times, steps, rows)
-            if not len(rows):
-                return motion.exits(level, last)
-    raise RuntimeError(f"{len(rows)} of {k} cases did not end in {STEPS} steps")
-
-
-def _only(which: Any, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Some entries along the last axis of each array."""
-    return tuple(values[..., which] for values in arrays)
+            steps = _Steps(
+                np.where(good, ends, steps.states),
+                np.where(good, end_rates, steps.rates),
+                np.where(good, steps.times + steps.lengths, steps.times),
+                np.minimum(steps.lengths * np.clip(factor, 0.2, 5.0), LONGEST),
+                steps.rows,
+                ends,
+            ).only(~(out | (good & motion.lost(ends))))
+            if not len(steps.rows):
+                break
+        else:
+            raise RuntimeError(f"{len(steps.rows)} of {k} cases did not end in {STEPS} steps")
+        found, lowest = np.full((4, k), np.nan), np.full(k, MARS.interface)
+        leaving, levelling = (_Steps(*(np.concatenate(part, axis=-1) for part in zip(*kept, strict=True))) for kept in (last, level))
+        found[:, leaving.rows] = motion.until(0, MARS.interface, leaving)
+        np.minimum.at(lowest, levelling.rows, motion.until(2, 0.0, levelling)[0])
+    return Exits(found[1], found[2], found[3], np.where(np.isnan(found[0]), np.nan, lowest))
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """The equations of a capsule's cases, and steps along them; states (4, m) are altitude, speed, path angle and heat load."""
+    """The equations of a capsule's cases, and steps along them."""
 
     capsule: Capsule
     density: np.ndarray
@@ -331,42 +347,19 @@ class _Motion:
         radius = MARS.radius + altitude if self.capsule.curved else MARS.entry_radius
         return np.asarray((altitude < FLOOR) | (0.5 * speed**2 < MARS.mu / (radius * MARS.entry_radius) * (MARS.interface - altitude)))
 
-    def step(
-        self, states: np.ndarray, slopes: np.ndarray, times: np.ndarray, steps: np.ndarray, rows: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States and rates at the end of steps (m,), and the errors, of which 1 is allowed."""
-        stages = [slopes]
+    def step(self, at: _Steps, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States and rates at the end of steps of other lengths (m,), and the errors, of which 1 is allowed."""
+        stages = [at.rates]
         for weights, share in zip(TABLEAU, TIMES, strict=True):
-            ends = states + steps * sum(weight * stage for weight, stage in zip(weights, stages, strict=True) if weight)
-            stages.append(self.rates(ends, times + share * steps, rows))
-        error = steps * sum(weight * stage for weight, stage in zip(RK45.E, stages, strict=True) if weight)
+            ends = at.states + lengths * sum(weight * stage for weight, stage in zip(weights, stages, strict=True) if weight)
+            stages.append(self.rates(ends, at.times + share * lengths, at.rows))
+        error = lengths * sum(weight * stage for weight, stage in zip(RK45.E, stages, strict=True) if weight)
         return ends, stages[-1], np.abs(error / (TOLERANCE * SCALES)).max(axis=0)
 
-    def exits(self, level: Sequence[tuple[np.ndarray, ...]], last: Sequence[tuple[np.ndarray, ...]]) -> Exits:
-        """From the steps in which cases are level, and the last ones of those that leave the air: arguments of `until`."""
-        found, lowest = np.full((4, len(self.density)), np.nan), np.full(len(self.density), MARS.interface)
-        if last:
-            steps = [np.concatenate(one, axis=-1) for one in zip(*last, strict=True)]
-            found[:, steps[-1]] = self.until(0, MARS.interface, *steps)
-        if level:
-            steps = [np.concatenate(one, axis=-1) for one in zip(*level, strict=True)]
-            np.minimum.at(lowest, steps[-1], self.until(2, 0.0, *steps)[0])
-        return Exits(found[1], found[2], found[3], np.where(np.isnan(found[0]), np.nan, lowest))
-
-    def until(
-        self,
-        which: int,
-        value: float,
-        states: np.ndarray,
-        ends: np.ndarray,
-        slopes: np.ndarray,
-        times: np.ndarray,
-        steps: np.ndarray,
-        rows: np.ndarray,
-    ) -> np.ndarray:
+    def until(self, which: int, value: float, steps: _Steps) -> np.ndarray:
         """States where one of them has a value that it reaches within a step: Newton's method on the length of the step."""
-        length = steps * (value - states[which]) / (ends[which] - states[which])
+        lengths = steps.lengths * (value - steps.states[which]) / (steps.ends[which] - steps.states[which])
         for _ in range(6):
-            there, rates, _ = self.step(states, slopes, times, length, rows)
-            length = np.clip(length - (there[which] - value) / rates[which], 0.0, steps)
+            there, rates, _ = self.step(steps, lengths)
+            lengths = np.clip(lengths - (there[which] - value) / rates[which], 0.0, steps.lengths)
         return there

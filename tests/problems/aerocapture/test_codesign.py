@@ -48,12 +48,7 @@ def test_expressions_have_the_values_of_arrays_and_true_derivatives():
 
 @pytest.mark.slow
 def test_corridors_against_flights_from_the_entry():
-    rng = np.random.default_rng(8)
-    for ballistic, ratio in [
-        (45.0, 0.32),
-        (600.0, 0.72),
-        *zip(np.exp(rng.uniform(*np.log(BALLISTIC), 6)), rng.uniform(0.3, 0.8, 6), strict=True),
-    ]:
+    for ballistic, ratio in ((45.0, 0.32), (600.0, 0.72), (1100.0, 0.5)):
         assert corridor_width(ballistic, ratio) == pytest.approx(width(ballistic, ratio), abs=2e-3)
         assert float(ca.evalf(corridor_width(ca.MX(ballistic), ratio))) == pytest.approx(corridor_width(ballistic, ratio), rel=1e-12)
 
