@@ -1,4 +1,4 @@
-"""Ascent, orbit rise and landing sites: statements against the papers, true fronts against other code."""
+"""Ascent, orbit rise and landing sites: statements against the papers, true fronts against other code; bad data of all cases."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
+from statements import refused
 
 from macs import optimize
 from macs.pareto.dominance import nondominated
@@ -15,6 +16,62 @@ from problems import load
 from problems.cases import goddard, landing_site, orbit_rise
 from runs import gd
 from transcription import DFET
+
+NAN = math.nan
+BAD_DATA = {
+    "aerocapture": [
+        ({"exit_speed": 3600.0}, "exit_speed"),
+        ({"arrival_speed": -1.0}, "arrival_speed"),
+        ({"arrival_speed": NAN}, "arrival_speed"),
+    ],
+    "aerocapture_bank": [
+        ({"shape": 7}, "no solution 7 of Table 2"),
+        ({"shape": (0.5, 0.4, 50.0)}, "five variables, not 3"),
+        ({"shape": 2.5}, "number of a solution"),
+        ({"shape": (0.5, 0.4, NAN, 30.0, 20.0)}, "finite"),
+        ({"shape": (0.5, 0.4, 50.0, 70.0, 25.0)}, "rear cone is lit"),
+        ({"shape": (0.9, 0.2, 70.0, 5.0, 0.0)}, "not captured"),
+        ({"bank_rate": 0.0}, "bank rate"),
+        ({"declination": 20.0}, "declination"),
+        ({"declination": NAN}, "declination"),
+        ({"shield": -1.0}, "heat shield"),
+    ],
+    "aerocapture_codesign": [
+        ({"shape": 6}, "aerocapture_codesign: there is no solution 6"),
+        ({"corridor": 1}, "True or False"),
+        ({"bank_rate": 0.0}, "aerocapture_codesign: the bank rate"),
+        ({"declination": 20.0}, "declination"),
+        ({"delta_v": 20.0}, "24.5 to"),
+        ({"delta_v": 101.0}, "at most 0.05 rad"),
+        ({"delta_v": "small"}, "aerocapture_codesign: delta_v", "must be a number"),
+    ],
+    "reentry_case1": [
+        ({"mass": 0.0}, "mass", "positive"),
+        ({"mass": "heavy"}, "mass", "number"),
+        ({"lag_gain": -0.1}, "lag_gain", "positive"),
+        ({"final_time": NAN}, "final_time", "finite"),
+        ({"altitude_tolerance": -1.0}, "altitude", "tolerance", "negative"),
+        ({"altitude_tolerance": 1e6}, "altitude", "outside its bounds"),
+        ({"gravity": "none"}, "gravity", "newtonian", "constant", "none"),
+        ({"weight": 1.0}, "weight", "reentry_case1"),
+    ],
+    "skip": [
+        ({"impulse": 0.0}, "skip", "impulse", "positive"),
+        ({"thrust_lag": -1.0}, "skip", "lag", "thrust", "positive"),
+        ({"lowest": 90e3}, "skip", "lowest altitude", "outside"),
+        ({"fastest": 100.0}, "skip", "initial speed", "outside"),
+        ({"mass": 1000.0}, "skip", "mass", "outside"),
+        ({"lift": 1.0}, "skip", "lift"),
+    ],
+    "smv": [({"lag_gain": 0.0}, "smv", "lag"), ({"mass": NAN}, "smv", "mass")],
+}
+
+
+@pytest.mark.parametrize(
+    ("case", "data", "words"), [(case, data, words) for case, rows in BAD_DATA.items() for data, *words in rows], ids=str
+)
+def test_data_that_make_no_sense_are_refused(case, data, words):
+    refused(lambda: load(case, **data), *words)
 
 
 def test_the_longest_ascent_has_the_speed_of_the_literature():

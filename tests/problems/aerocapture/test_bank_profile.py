@@ -133,26 +133,6 @@ def test_table_3_is_beside_the_front(shape, above, heavier):
     assert lighter.objectives["delta v"] < delta_v
 
 
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        ({"shape": 7}, "no solution 7 of Table 2"),
-        ({"shape": (0.5, 0.4, 50.0)}, "five variables, not 3"),
-        ({"shape": 2.5}, "number of a solution"),
-        ({"shape": (0.5, 0.4, np.nan, 30.0, 20.0)}, "finite"),
-        ({"shape": (0.5, 0.4, 50.0, 70.0, 25.0)}, "rear cone is lit"),
-        ({"shape": (0.9, 0.2, 70.0, 5.0, 0.0)}, "not captured"),
-        ({"bank_rate": 0.0}, "bank rate"),
-        ({"declination": 20.0}, "declination"),
-        ({"declination": np.nan}, "declination"),
-        ({"shield": -1.0}, "heat shield"),
-    ],
-)
-def test_data_that_make_no_sense(data, words):
-    with pytest.raises(ValueError, match=words):
-        load("aerocapture_bank", **data)
-
-
 def test_a_shape_by_its_variables():
     by_number, by_variables = (load("aerocapture_bank", shape=shape) for shape in (3, list(TABLE_2[3].design)))
     assert by_number.compile().fingerprint == by_variables.compile().fingerprint

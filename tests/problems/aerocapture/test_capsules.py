@@ -185,15 +185,6 @@ def test_shapes_of_which_nothing_can_be_said_are_failed_evaluations() -> None:
     assert np.isfinite(F[0]).all() and np.isnan(F[1]).all() and np.isnan(violations[1]).all()
 
 
-@pytest.mark.parametrize(
-    ("data", "word"),
-    [({"exit_speed": 3600.0}, "exit_speed"), ({"arrival_speed": -1.0}, "arrival_speed"), ({"arrival_speed": np.nan}, "arrival_speed")],
-)
-def test_speeds_that_cannot_be_are_refused(data: dict[str, float], word: str) -> None:
-    with pytest.raises(ValueError, match=word):
-        load("aerocapture", **data)
-
-
 @pytest.mark.slow
 def test_searches_of_the_paper_s_budget() -> None:
     whole = hypervolume_at(reference(), POINT)
