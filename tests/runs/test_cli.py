@@ -150,7 +150,7 @@ def test_other_transcriptions_are_solved_shown_and_verified(capsys, method, exce
 @pytest.mark.slow
 def test_points_that_miss_when_simulated_are_told_by_solve_by_show_and_by_verify(capsys):
     """That is no failure of `solve`, but `verify` says no."""
-    call = ["solve", "glide.py:rough", "--inner", "projection", "--mesh", "fixed", "--seed", "1"]
+    call = ["solve", "glide.py:rough", "--inner", "projection", "--mesh", "fixed", "--seed", "1", "--evaluations", "40"]
     assert main([*call, "--out", "rough.nc"]) == 0
     out = capsys.readouterr().out
     assert "Not verified: simulated, these differ by more than 0.001." in out and "simulated, its states differ by" in out
@@ -174,7 +174,7 @@ def test_points_that_miss_when_simulated_are_told_by_solve_by_show_and_by_verify
 
 @pytest.mark.slow
 def test_how_much_points_may_miss_is_of_the_problem_or_of_the_call(capsys):
-    options = ["--mesh", "fixed", "--seed", "1", "--out", "front.nc"]
+    options = ["--mesh", "fixed", "--seed", "1", "--evaluations", "40", "--out", "front.nc"]
     assert main(["solve", "glide.py:forgiving", *options]) == 0
     assert Front.load("front.nc").stats["verify"] == 0.5 and Front.load("front.nc").verified.all()
     capsys.readouterr()
