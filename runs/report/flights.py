@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from textwrap import fill, wrap
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -63,7 +64,7 @@ class Flights:
                 return cls(comparison, solver, front, case)
         return None
 
-    @property
+    @cached_property
     def points(self) -> list[Point]:
         """The representative points."""
         return [self.front[i] for i in representatives(self.front)]

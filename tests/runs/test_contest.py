@@ -96,12 +96,6 @@ def test_functions_of_pymoo_are_those_of_the_paper(kind, m):
         np.testing.assert_allclose(function(np.hstack([others, np.zeros((len(others), 20))])), front, rtol=1e-9)
 
 
-def test_fronts_of_zdt_are_dense():
-    for kind in (1, 2, 3, 4, 6):
-        front = plain.zdt(kind).front()
-        assert len(front) == 1000
-
-
 def rows_of(case: str, key: str, evaluations: float, **found: list[float]) -> list[Row]:
     """The rows of a case; names of rivals with - as _."""
     return [
