@@ -264,9 +264,7 @@ class Front(Points):
             Name -> two objectives (k, 2) of other points, such as a known front; drawn in black and grey.
         """
         from .fronts.pictures.front_plot import draw_front
-        from .fronts.pictures.style import check_no_path
 
-        check_no_path(ax, "front.plot()")
         return draw_front(self, ax, marked, beside)
 
     def plot_trajectories(self, points: Sequence[int], figure: Figure | None = None) -> np.ndarray:
@@ -285,9 +283,7 @@ class Front(Points):
             If there are none or too many, or one has no trajectory.
         """
         from .fronts.pictures.flight_plot import draw_flights
-        from .fronts.pictures.style import check_no_path
 
-        check_no_path(figure, f"front.plot_trajectories({list(points)})[0]")
         return draw_flights([self[i] for i in points], figure)
 
     def plot_variables(self, figure: Figure | None = None) -> np.ndarray:
@@ -299,9 +295,7 @@ class Front(Points):
             For trajectories: `front[i].plot()` draws one of them.
         """
         from .fronts.pictures.front_plot import draw_designs
-        from .fronts.pictures.style import check_no_path
 
-        check_no_path(figure, "front.plot_variables()[0]")
         if self.dynamic:
             raise ValueError("these points are trajectories: draw one of them, front[i].plot()")
         title = f"{self.source.name if self.source else 'black box'}: {counted(len(self), 'point')}"

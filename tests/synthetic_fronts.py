@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from macs.front import Front
+from macs.fronts.point import Point
+from macs.fronts.points import Points
 from problems import Problem
 from problems.compiled import CompiledProblem, Objective, Variable
 from transcription.numerics.polynomials import nodes
@@ -109,6 +113,28 @@ def flights(n: int = 5, seed: int = 0, elements: int | list[int] = 3, **changes)
         "stats": {"evaluations": 1000, "inner_iterations": 321, "failures": {"infeasible": 3}, "wall_time": 1.25, "seed": 7},
     }
     return Front(**{**columns, **changes})
+
+
+def costated(length: float = 2.0) -> Front:
+    """Two trajectories, of which the second has an optional phase so long, and costates."""
+    trajectory, costates = with_optional_phase(length)
+    front = flights(2, elements=[2, 3])
+    return front.replace(trajectories=[front.trajectories[0], trajectory], costates=[None, costates])
+
+
+def contents(of: Any) -> Any:
+    """All that there is in a front, or in a part of one, but its compiled problem: equal for two if they have the same bits."""
+    if isinstance(of, Front | Points):
+        return {name: contents(value) for name, value in vars(of).items() if name != "_problem"}
+    if isinstance(of, Point):
+        return contents(of.alone())
+    if isinstance(of, np.ndarray):
+        return of.shape, of.dtype.kind, of.tolist() if of.dtype.kind in "UO" else np.ascontiguousarray(of).tobytes()
+    if is_dataclass(of):
+        return {field.name: contents(getattr(of, field.name)) for field in fields(of) if field.compare}
+    if isinstance(of, Mapping):
+        return {key: contents(value) for key, value in of.items()}
+    return [contents(one) for one in of] if isinstance(of, tuple | list) else repr(of)
 
 
 def black_box(n: int = 6, m: int = 2, seed: int = 0, **changes) -> Front:

@@ -114,15 +114,15 @@ class Pieces(NamedTuple):
     def table(self, unit: str, of_entries: str) -> dict[str, FileArray]:
         """The arrays, with the units of time and of coefficients."""
         what, some = f"{self.kind}s", self is COSTATES
-        arrays = {
-            self.edges: (("point", self.edge), NUMBER, f"ends of the elements of the {what}", unit),
-            self.coefficients: (
-                *(("point", *self.dimensions[1:], self.entry), NUMBER),
-                *(f"coefficients of the {what} on each element, in the basis {self.kind}_basis", of_entries),
-            ),
-            f"{self.kind}_basis": (("point",), TEXT, f"basis of the {what} on [-1, 1]: {', '.join(BASES)}", "1"),
+        at = ("point", *self.dimensions[1:], self.entry)
+        each = f"coefficients of the {what} on each element, in the basis {self.kind}_basis"
+        known = f"basis of the {what} on [-1, 1]: {', '.join(BASES)}"
+        return {
+            self.edges: FileArray(("point", self.edge), NUMBER, f"ends of the elements of the {what}", unit, some),
+            self.coefficients: FileArray(at, NUMBER, each, of_entries, some),
+            f"{self.kind}_basis": FileArray(("point",), TEXT, known, "1", some),
+            **_counts_table(self.dimensions, some),
         }
-        return {name: FileArray(*about, optional=some) for name, about in arrays.items()} | _counts_table(self.dimensions, some)
 
     def write(self, several: Sequence[PiecewisePolynomial | None], entries: int) -> dict[str, np.ndarray]:
         """The polynomials of all points as arrays."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from typing import Any
 
@@ -239,17 +238,13 @@ class Point:
         """
         from .pictures.flight_plot import draw_flight
         from .pictures.front_plot import draw_designs
-        from .pictures.style import check_no_path, hollow, raised, remark
+        from .pictures.style import caption, hollow
 
-        check_no_path(figure, f"front[{self.index}].plot()[0]")
-        said = remark(self)
-        named = self._named(raised)
-        title = f"{named}; {said}" if said else named
         if not self._points.dynamic:
-            return draw_designs(self._points, title, figure, [self.index])
+            return draw_designs(self._points, caption(self), figure, [self.index])
         if self.trajectory is None:
             raise ValueError("there is no trajectory to draw: the evaluation of the point failed")
-        return draw_flight(self.trajectory, title, figure, self.costates if costates else None, hollow=hollow(self))
+        return draw_flight(self.trajectory, caption(self), figure, self.costates if costates else None, hollow=hollow(self))
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the trajectory as a table for a spreadsheet, a row for each node, under a header that names units.
@@ -264,12 +259,8 @@ class Point:
     @property
     def title(self) -> str:
         """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
-        return self._named(str)
-
-    def _named(self, unit: Callable[[str], str]) -> str:
-        """The objectives in one line, with units as this writes them."""
         named = zip(self.goals, self.objectives.values(), strict=True)
-        return ", ".join(f"{goal.name} {value:.6g} {unit(goal.unit)}".rstrip() for goal, value in named)
+        return ", ".join(f"{goal.name} {value:.6g} {goal.unit}".rstrip() for goal, value in named)
 
     def _repr_html_(self) -> str:
         """For notebooks: a table of the objectives and a small picture."""

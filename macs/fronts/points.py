@@ -44,16 +44,8 @@ def shared(dicts: Sequence[Mapping[str, Any] | None]) -> tuple[dict[str, Any] | 
     return tuple(found)
 
 
-def _numbers(entries: Sequence[Any]) -> np.ndarray:
-    return frozen(np.asarray(entries, dtype=float))
-
-
-def _texts(entries: Sequence[Any]) -> np.ndarray:
-    return frozen(np.asarray(entries, dtype=str))
-
-
-def _flags(entries: Sequence[Any]) -> np.ndarray:
-    return frozen(np.asarray(entries, dtype=bool))
+def _array(kind: type) -> Callable[[Sequence[Any]], np.ndarray]:
+    return lambda entries: frozen(np.asarray(entries, dtype=kind))
 
 
 def _notes(entries: Sequence[Any]) -> tuple[str, ...]:
@@ -78,9 +70,9 @@ def _stored(array: str, kind: str, long_name: str, optional: bool = False) -> tu
 
 
 COLUMNS = {
-    "F": PointColumn(_numbers),
-    "violation": PointColumn(_numbers, np.nan, *_stored("violation", NUMBER, "largest scaled residual of any constraint")),
-    "status": PointColumn(_texts, "", *_stored("status", TEXT, "converged, infeasible, failed or timeout")),
+    "F": PointColumn(_array(float)),
+    "violation": PointColumn(_array(float), np.nan, *_stored("violation", NUMBER, "largest scaled residual of any constraint")),
+    "status": PointColumn(_array(str), "", *_stored("status", TEXT, "converged, infeasible, failed or timeout")),
     "violations": PointColumn(tuple),
     "trajectories": PointColumn(tuple),
     "excursions": PointColumn(tuple),
@@ -91,13 +83,13 @@ COLUMNS = {
     "notes": PointColumn(_notes, "", *_stored("note", TEXT, "remark on the point")),
     "transcriptions": PointColumn(shared),
     "defect": PointColumn(
-        _numbers, np.nan, *_stored("defect", NUMBER, "largest scaled difference of a simulated state, NaN if not simulated", True)
+        _array(float), np.nan, *_stored("defect", NUMBER, "largest scaled difference of a simulated state, NaN if not simulated", True)
     ),
     "simulated_violation": PointColumn(
-        _numbers, np.nan, *_stored("simulated_violation", NUMBER, "largest scaled residual of any constraint as simulated", True)
+        _array(float), np.nan, *_stored("simulated_violation", NUMBER, "largest scaled residual of any constraint as simulated", True)
     ),
-    "simulated_F": PointColumn(_numbers, np.nan),
-    "verified": PointColumn(_flags, False, *_stored("verified", COUNT, "1 if the simulation agrees with the point, else 0", True)),
+    "simulated_F": PointColumn(_array(float), np.nan),
+    "verified": PointColumn(_array(bool), False, *_stored("verified", COUNT, "1 if the simulation agrees with the point, else 0", True)),
 }
 """What points consist of besides their decision vectors: the one table behind `Points`, its selections, unions, and its file."""
 

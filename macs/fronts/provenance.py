@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Annotated, Any, Required, TypedDict
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 import problems
 from problems.catalogue import is_catalogued
@@ -51,11 +53,9 @@ class ProblemSource:
         compiled = (problems.load(problem) if isinstance(problem, str) else problem).compile()
         if compiled.fingerprint != self.fingerprint:
             one, other = f"'{self.name}' ({self.fingerprint[:8]})", f"'{compiled.name}' ({compiled.fingerprint[:8]})"
-            raise ValueError(
-                f"{whose} belongs to problem {one}, not to {other}: bounds, equations, objectives or data differ, or another CasADi"
-                if not self.vector
-                else f"{whose} belongs to problem {one}, not to {other}: bounds, limits, objectives, data or values of the function differ"
-            )
+            parts = "bounds, limits, objectives, data or values of the function" if self.vector else "bounds, equations, objectives or data"
+            casadi = "" if self.vector else ", or another CasADi"
+            raise ValueError(f"{whose} belongs to problem {one}, not to {other}: {parts} differ{casadi}")
         return compiled
 
     def load(self) -> Any:
@@ -80,6 +80,27 @@ class ProblemSource:
         return problem
 
 
+Count = Annotated[int, Meta(ge=0)]
+Amount = Annotated[float, Meta(ge=0.0)]
+
+
+class Stats(TypedDict, total=False):
+    """`stats` of a front, as files may have them. Solvers and tools add more, see the manual."""
+
+    evaluations: Required[Count]  # candidates of a search
+    inner_iterations: Required[Count]
+    gradient_solves: Required[Count]
+    fallbacks: Required[Count]  # candidates that went to IPOPT, because the fast inner level failed
+    failures: Required[dict[str, Count]]  # by status
+    wall_time: Required[Amount]  # s
+    seed: Required[int | list[int | None] | None]  # of merged fronts several
+    tolerance: Required[Amount]  # of violations
+    reproducible: Required[bool]  # the same seed gives the same front
+    versions: Required[dict[str, str]]
+    verify: Annotated[float, Meta(gt=0.0)]  # how much verified points may miss
+    stopped: str  # why the work ended
+
+
 STATS: dict[str, Any] = {
     "evaluations": 0,
     "inner_iterations": 0,
@@ -91,7 +112,7 @@ STATS: dict[str, Any] = {
     "tolerance": 1e-6,
     "reproducible": True,
 }
-"""Entries that the `stats` of every front have, beside `versions`."""
+"""Defaults of the entries that the `stats` of every front have, beside `versions`."""
 
 
 def versions() -> dict[str, str]:
@@ -189,24 +210,12 @@ def source_attributes(source: ProblemSource | None) -> dict[str, str]:
 
 def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
     """`stats` from its attributes. Raises ValueError for what it cannot be."""
-    stats = read_document(attrs, "stats") | {"versions": read_document(attrs, "versions")}
-    for name, usual in STATS.items():
-        if name in attrs:
-            stats[name] = bool(attrs[name]) if isinstance(usual, bool) else attrs[name]
-        elif name not in stats:
-            raise ValueError(f"the attribute '{name}' is missing from it")
-    for name in ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "wall_time", "tolerance"):
-        if not isinstance(stats[name], int | float) or not stats[name] >= 0:
-            raise ValueError(f"the attribute '{name}' is no number of at least 0")
-    verify = stats.get("verify", 1.0)
-    if isinstance(verify, bool) or not isinstance(verify, int | float) or not verify > 0:
-        raise ValueError("what its points may miss when simulated, 'verify', is no positive number")
-    counts = [*stats["failures"].values()] if isinstance(stats["failures"], dict) else [None]
-    if not all(isinstance(count, int) for count in counts) or not isinstance(stats["reproducible"], bool):
-        raise ValueError("the attribute 'stats' is not what it should be")
-    seeds = stats["seed"] if isinstance(stats["seed"], list) else [stats["seed"]]
-    if not all(seed is None or isinstance(seed, int) for seed in seeds):
-        raise ValueError("the attribute 'seed' is no whole number")
+    stats = {**read_document(attrs, "stats"), "versions": read_document(attrs, "versions")}
+    stats |= {name: bool(attrs[name]) if isinstance(usual, bool) else attrs[name] for name, usual in STATS.items() if name in attrs}
+    try:
+        msgspec.convert(stats, Stats)
+    except msgspec.ValidationError as error:
+        raise ValueError(f"its 'stats' are not what they should be: {error}") from error
     return stats
 
 

@@ -69,41 +69,34 @@ def _said_apart(front: Points) -> str:
 
 def _table(front: Points, columns: Mapping[str, Sequence[Any]]) -> _Table:
     """The cells, a row for each point, with further columns."""
-    simulated = front.was_simulated
-    titles, units, cells, left = ["#"], [""], [[str(i) for i in range(len(front))]], [False]
-
-    def add(title: str, unit: str, column: list[str], flush: bool = False) -> None:
-        titles.append(title)
-        units.append(unit)
-        cells.append(column)
-        left.append(flush)
-
+    vector, was = _is_vector(front), front.was_simulated
+    # Title and unit, cells, and whether they are flush left.
+    table: list[tuple[tuple[str, str], Sequence[str], bool]] = [(("#", ""), [str(i) for i in range(len(front))], False)]
     for goal, values in zip(front.goals, front.objectives.T, strict=True):
-        add(goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]", numbers(values))
-    add("violation", "", _small(front.violation))
-    if _is_vector(front) and len(front.variables) <= 6:
+        table.append(((goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]"), numbers(values), False))
+    table.append((("violation", ""), _small(front.violation), False))
+    if vector and len(front.variables) <= 6:
         for variable, values in zip(front.variables, front.decision.T, strict=True):
-            add(variable.name, f"[{variable.unit or '-'}]", numbers(values))
-    if simulated.any():
-        off, how = np.abs(front.simulated_F - front.F) / objective_scales(front), "again" if _is_vector(front) else "simulated"
-        if not _is_vector(front):
-            add("defect", how, _small(front.defect))
-        add("violation", how, _small(front.simulated_violation))
-        add("objectives", "off by", _small(off.max(axis=1)))
-    for header, values in columns.items():
-        add(header, "", [value if isinstance(value, str) else f"{value:.1e}" for value in values])
-    certified = [point.optimality for point in front]
-    if any(value is not None for value in certified):
-        add("optimality", "", _small(certified))
-    add("status", "", [_status(point) for point in front], True)
+            table.append(((variable.name, f"[{variable.unit or '-'}]"), numbers(values), False))
+    if was.any():
+        off, how = np.abs(front.simulated_F - front.F) / objective_scales(front), "again" if vector else "simulated"
+        table += [] if vector else [(("defect", how), _small(front.defect), False)]
+        table.append((("violation", how), _small(front.simulated_violation), False))
+        table.append((("objectives", "off by"), _small(off.max(axis=1)), False))
+    for header, given in columns.items():
+        table.append(((header, ""), [value if isinstance(value, str) else f"{value:.1e}" for value in given], False))
+    if any(value is not None for value in front.optimality):
+        table.append((("optimality", ""), _small(front.optimality), False))
+    table.append((("status", ""), [_status(point) for point in front], True))
     if len({id(one) for one in front.transcriptions}) > 1:
-        add("elements", "", [_elements(point) for point in front])
-    if front.dynamic and not simulated.all():
-        add("between nodes", "leaves bounds", [_excursion(point.excursions) for point in front], True)
-    apart = np.flatnonzero(simulated & ~front.verified)
+        table.append((("elements", ""), [_elements(point) for point in front], False))
+    if front.dynamic and not was.all():
+        table.append((("between nodes", "leaves bounds"), [_excursion(point.excursions) for point in front], True))
+    apart = np.flatnonzero(was & ~front.verified)
     order = [*np.setdiff1d(np.arange(len(front)), apart), *apart]
+    heads, cells, left = zip(*table, strict=True)
     rows = list(zip(*cells, strict=True))
-    return _Table([titles, units], [rows[i] for i in order], left, len(apart))
+    return _Table([*zip(*heads, strict=True)], [rows[i] for i in order], left, len(apart))
 
 
 def _is_vector(front: Points) -> bool:
@@ -255,25 +248,10 @@ def _simulated(front: Points) -> list[str]:
 
 
 def _not_simulated(front: Points) -> list[str]:
-    """That trajectories were not simulated, what does it, and what leaves its bounds between nodes."""
+    """That trajectories were not simulated, and what does it."""
     count = int((~front.was_simulated).sum())
     which = "The point was" if len(front) == 1 else f"{count} of {len(front)} points were" if count < len(front) else "The points were"
-    return [f"{which} not simulated: front.verify() does that, or `macs verify` of the file.", *_between_nodes(front)]
-
-
-def _between_nodes(front: Points) -> list[str]:
-    """What leaves its bounds between nodes, for points that were not simulated."""
-    leaving = [
-        (max(found.values()), max(found, key=lambda key: found[key]), i) for i, point in enumerate(front) if (found := point.excursions)
-    ]
-    if leaving:
-        amount, name, index = max(leaving)
-        verb = "leaves its" if len(leaving) == 1 else "leave their"
-        worst = f"{name} of point {index} by {amount:.2g} of its scale at most"
-        return [f"{len(leaving)} of {counted(len(front), 'point')} {verb} bounds between nodes: {worst}."]
-    if all(point.excursions is not None for point in front):
-        return ["No point leaves its bounds between nodes."]
-    return []
+    return [f"{which} not simulated: front.verify() does that, or `macs verify` of the file."]
 
 
 def _nothing(front: Points) -> list[str]:

@@ -25,7 +25,7 @@ from transcription.trajectories.trajectory import PhaseTrajectory
 from ..evaluation.evaluator import CONVERGED
 from .point import Point
 from .points import Points
-from .verified import evaluated_independently, objective_scales, simulated_independently
+from .verified import objective_scales, verified
 
 OTHER_MACHINE = 1e-9
 """Numbers that another run of the same arithmetic on another machine may give, in scales."""
@@ -50,66 +50,55 @@ class Check:
         return not self.reasons
 
 
-def verify(
-    front: Points,
-    *,
-    tolerance: float,
-    rtol: float = 1e-10,
-    atol: float = 1e-11,
-    method: str = "DOP853",
-    transcription: Transcription | None = None,
-) -> list[Check]:
+def verify(front: Points, *, tolerance: float, rtol: float = 1e-10) -> list[Check]:
     """Check every point of a front. Those of a vector problem, which have no trajectories to be wrong, are evaluated again."""
-    scales, limit = objective_scales(front), front.stats["tolerance"]
-    stated = front.stated()
+    stated, allowed = front.stated(), front.stats["tolerance"]
+    plain = front.replace(notes=[""] * len(front))
     if isinstance(stated, CompiledVectorProblem):
         names = [v.name for v in stated.variables]
         if len(front) and [v.name for v in front.variables] != names:
             raise ValueError(f"the variables of the front are not {', '.join(names)}")
-        found, again = evaluated_independently(front), "evaluated again"
-        recomputed = [("", 0.0, F, violation, worst) for F, violation, worst in zip(found.F, found.violation, found.worst, strict=True)]
-        limit = max(tolerance, limit)
+        marked = verified(plain, tolerance)
+        recomputed = [(0.0, "", F, v, "") for F, v in zip(marked.simulated_F, marked.simulated_violation.tolist(), strict=True)]
+        allowed = max(tolerance, allowed)
     else:
         # What is wrong with the front as such is reported before any simulation.
-        programs, again = _programs(front, transcription), "simulated"
+        programs = _programs(front)
         recomputed = [_recomputed(point, nlp) for point, nlp in zip(front, programs, strict=True)]
-        found = simulated_independently(front, partial(simulate_all, stated, rtol=rtol, atol=atol, method=method))
-    missed = found.off(front, scales).max(axis=1, initial=0.0)
-    before = "recomputed" if front.dynamic else again
-    defect, simulated = (np.where(np.isnan(column), np.inf, column) for column in (found.defect, found.violation))
+        marked = verified(plain, tolerance, remark=False, simulations=partial(simulate_all, stated, rtol=rtol, atol=0.1 * rtol))
+    missed = _infinite(np.abs(marked.simulated_F - front.F) / objective_scales(front)).max(axis=1, initial=0.0)
+    defect, simulated = _infinite(marked.defect), _infinite(marked.simulated_violation)
 
     def check(i: int, point: Point) -> Check:
-        where, mismatch, F, violation, worst = recomputed[i]
-        off = np.abs(F - point.F) / np.maximum(1.0, np.abs(F))
-        objectives = float(np.where(np.isnan(off), np.inf, off).max(initial=0.0))
+        mismatch, where, F, violation, worst = recomputed[i]
+        objectives = float(_infinite(np.abs(F - point.F) / np.maximum(1.0, np.abs(F))).max(initial=0.0))
         failures = [
-            (not front.dynamic and not np.isfinite(F).all(), f"{again}, it fails"),
             (not mismatch <= OTHER_MACHINE, f"stored {where} differ from the decision vector by {mismatch:.1e}"),
             (front.dynamic and not objectives <= OTHER_MACHINE, f"stored objectives differ from recomputed ones by {objectives:.1e}"),
-            (not abs(violation - point.violation) <= limit, f"stored violation {point.violation:.1e}, {before} {violation:.1e}"),
+            (not abs(violation - point.violation) <= allowed, f"stored violation {point.violation:.1e}, recomputed {violation:.1e}"),
             (point.status != CONVERGED, f"its status is '{point.status}'"),
-            (not violation <= limit, f"violates {worst} by {violation:.1e} (tolerance {limit:.0e})"),
-            (not defect[i] <= tolerance, f"{again}, it ends {defect[i]:.1e} away (tolerance {tolerance:.1e})"),
-            (
-                front.dynamic and not simulated[i] <= tolerance,
-                f"{again}, it violates {found.worst[i] or 'everything'} by {simulated[i]:.1e} (tolerance {tolerance:.1e})",
-            ),
-            (not missed[i] <= tolerance, f"{again}, its objectives differ by {missed[i]:.1e} (tolerance {tolerance:.1e})"),
+            (front.dynamic and not violation <= allowed, f"violates {worst} by {violation:.1e} (tolerance {allowed:.0e})"),
+            (bool(marked.notes[i]), marked.notes[i]),
         ]
         reasons = tuple(reason for wrong, reason in failures if wrong)
-        return Check(i, mismatch, float(violation), objectives, float(defect[i]), float(simulated[i]), float(missed[i]), reasons)
+        return Check(i, mismatch, violation, objectives, float(defect[i]), float(simulated[i]), float(missed[i]), reasons)
 
     return [check(i, point) for i, point in enumerate(front)]
 
 
-def _programs(front: Points, transcription: Transcription | None) -> list[NLP]:
+def _infinite(values: np.ndarray) -> np.ndarray:
+    """The values, those that are no numbers infinite."""
+    return np.where(np.isnan(values), np.inf, values)
+
+
+def _programs(front: Points) -> list[NLP]:
     """The transcribed problem of each point."""
     nlps: dict[Transcription, NLP] = {}
     found = []
     for point in front:
         if point.transcription is None:
             raise ValueError("the front does not say how its problem was transcribed")
-        method = transcription or from_dict(point.transcription)
+        method = from_dict(point.transcription)
         nlp = nlps[method] if method in nlps else nlps.setdefault(method, method.transcribe(front.compiled()))
         if tuple(v.name for v in nlp.variables) != tuple(v.name for v in point.variables):
             raise ValueError(
@@ -120,13 +109,12 @@ def _programs(front: Points, transcription: Transcription | None) -> list[NLP]:
     return found
 
 
-def _recomputed(point: Point, nlp: NLP) -> tuple[str, float, np.ndarray, float, str]:
-    """What differs most between the stored trajectory and that of the decision vector, and by how much; the objectives (m,) and violation
-    of the decision vector, and the constraint that is violated most."""
-    mismatch, where = _mismatch(point, nlp)
+def _recomputed(point: Point, nlp: NLP) -> tuple[float, str, np.ndarray, float, str]:
+    """By how much the stored trajectory and that of the decision vector differ, and where most; the objectives (m,) and violation of the
+    decision vector, and the constraint that is violated most."""
     F, violation = nlp.evaluate(point.decision[None])
     violations = nlp.violations(point.decision)
-    return where, mismatch, F[0], float(violation[0]), max(violations, key=lambda key: violations[key])
+    return *_mismatch(point, nlp), F[0], float(violation[0]), max(violations, key=lambda key: violations[key])
 
 
 def _mismatch(point: Point, nlp: NLP) -> tuple[float, str]:

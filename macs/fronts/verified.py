@@ -111,7 +111,7 @@ def verified(
     tolerance: float | None,
     scales: np.ndarray | None = None,
     remark: bool = True,
-    simulations: Simulations | None = None,
+    simulations: Callable[[list[Trajectory]], Sequence[Simulation]] | None = None,
 ) -> Kind:
     """The same points with the columns of a simulation, or of another evaluation, and with a note where it does not agree.
 

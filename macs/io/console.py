@@ -14,9 +14,7 @@ from contextvars import ContextVar, Token
 from types import TracebackType
 from typing import Any, Self, TextIO
 
-import numpy as np
-
-from .interrupts import Interrupts
+from .interrupts import Interrupts, numbers_may_blow_up
 
 LINE_EVERY = 10.0
 """Seconds between plain lines."""
@@ -159,19 +157,9 @@ class Steps(StatusLine):
         """The present step, its number and the elapsed time."""
         return f"{super().line()}, {minutes(self.elapsed)}"
 
-    def asked(self) -> bool:
-        """Whether Ctrl-C was pressed, for `transcription.stopping`."""
-        return bool(self._interrupts.reason)
-
     def check(self) -> None:
         """Raise `Stopped` if Ctrl-C was pressed."""
         self._interrupts.check()
-
-
-def numbers_may_blow_up() -> np.errstate:
-    """A context of work on trajectories, some of which are far from feasible: statuses and violations say what is no number there, and
-    warnings of numpy would add nothing."""
-    return np.errstate(over="ignore", invalid="ignore", divide="ignore")
 
 
 @contextmanager

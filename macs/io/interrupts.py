@@ -8,9 +8,11 @@ import time
 from contextlib import AbstractContextManager, ExitStack
 from types import FrameType, TracebackType
 
+import numpy as np
+
 from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_by
 
-__all__ = ["Interrupts", "Stopped"]
+__all__ = ["Interrupts", "Stopped", "numbers_may_blow_up"]
 
 
 class Interrupts(AbstractContextManager["Interrupts"]):
@@ -32,11 +34,6 @@ class Interrupts(AbstractContextManager["Interrupts"]):
     def elapsed(self) -> float:
         """Seconds that the work has taken, those in earlier processes included."""
         return self._earlier + self._here
-
-    @property
-    def left(self) -> float | None:
-        """Seconds that are left of the time limit; None without one."""
-        return None if self._time_limit is None else max(self._time_limit - self._here, 0.0)
 
     @property
     def _here(self) -> float:
@@ -78,3 +75,9 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         self._interrupted = True
         if self._whole is not None and not self._whole._interrupted:
             self._whole._interrupt(number, frame)
+
+
+def numbers_may_blow_up() -> np.errstate:
+    """A context of work on trajectories, some of which are far from feasible: statuses and violations say what is no number there, and
+    warnings of numpy would add nothing."""
+    return np.errstate(over="ignore", invalid="ignore", divide="ignore")

@@ -10,17 +10,14 @@ from typing import Any
 
 import numpy as np
 
-LEFT = str.ljust
-
-
-RIGHT = str.rjust
-
 
 def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], left: Sequence[bool]) -> str:
     """A text table with aligned columns and a rule under the headers."""
     cells = [*headers, *rows]
     widths = [max(len(row[i]) for row in cells) for i in range(len(left))]
-    lines = ["  ".join((LEFT if flush else RIGHT)(cell, w) for cell, w, flush in zip(row, widths, left, strict=True)) for row in cells]
+    lines = [
+        "  ".join((str.ljust if flush else str.rjust)(cell, w) for cell, w, flush in zip(row, widths, left, strict=True)) for row in cells
+    ]
     lines.insert(len(headers), "  ".join("-" * w for w in widths))
     return "\n".join(line.rstrip() for line in lines)
 

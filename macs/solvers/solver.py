@@ -28,8 +28,8 @@ from ..front import Front
 from ..fronts.builders import from_archive, from_vector_problem, no_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
-from ..io.console import StatusLine, numbers_may_blow_up
-from ..io.interrupts import Interrupts
+from ..io.console import StatusLine
+from ..io.interrupts import Interrupts, numbers_may_blow_up
 from ..refinement.mesh_search import search_meshes
 from .method import SearchMethod
 from .progress import Progress

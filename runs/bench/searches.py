@@ -20,7 +20,6 @@ from problems.cases import goddard, landing_site, orbit_rise
 from problems.catalogue import STANDARD
 from problems.phase import Phase
 from transcription import Transcription, parse
-from transcription.stopping import stopped_by
 
 from ..measures.indicators import gd, hypervolume, igd
 from .contract import ASKED, SECONDS, Bench, Column, Effort, Row, Target, column, finished, rounds_of, short
@@ -219,8 +218,7 @@ def sweeps(problem: Problem, method: Transcription, work: int, seed: int, steps:
 
 def swept(problem: Problem, method: Transcription, steps: Steps, **settings: object) -> Front:
     """A sweep that Ctrl-C ends."""
-    with stopped_by(steps.asked):
-        front = sweep(problem, method, points=FRONT_SIZE, **settings)  # type: ignore[arg-type]
+    front = sweep(problem, method, points=FRONT_SIZE, **settings)  # type: ignore[arg-type]
     steps.check()
     return front
 

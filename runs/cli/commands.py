@@ -146,13 +146,13 @@ def verify(arguments: Namespace) -> int:
         problem = problem_of(front.source, arguments.problem) if arguments.problem else front.source.load()
         tolerance = arguments.tolerance or problem.default_verify
         front = front.replace(problem=front.source.check(problem, arguments.front))
-        checks = verify_front(front, tolerance=tolerance, rtol=arguments.rtol, atol=0.1 * arguments.rtol)
+        checks = verify_front(front, tolerance=tolerance, rtol=arguments.rtol)
     print(verification_table(front, checks))
     failed = [check for check in checks if not check.ok]
     if not checks:
         print(f"There is no point to verify. {front.message}".rstrip())
     elif failed:
-        print(f"\n{len(failed)} of {len(checks)} points fail.")
+        print(f"\n{len(failed)} of {len(checks)} points fail, by a tolerance of {tolerance:g}.")
     else:
         how = "simulated, they" if front.dynamic else "evaluated again, they"
         print(f"\nAll {len(checks)} points verify: {how} stay within {tolerance:g}.")

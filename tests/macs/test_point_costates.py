@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import io
 from itertools import pairwise
 
 import casadi as ca
-import h5py
 import numpy as np
 import pytest
-from synthetic_fronts import black_box
+from synthetic_fronts import black_box, contents
 
 from macs import MACS, Front, optimize, sweep
-from macs.fronts import files
 from macs.fronts.dataset import phase_dataset, root_dataset
 from macs.fronts.points import Points
-from macs.io.atomic import sealed, unsealed
 from problems import Problem, load
 from problems.cases import goddard
 from transcription import parse
@@ -168,27 +164,14 @@ def test_where_nothing_is_feasible_there_are_none():
 # Files and pictures.
 
 
-def same(one, other) -> bool:
-    """Whether two points have the same costates, to the last bit."""
-    return one.weights == other.weights and all(
-        np.array_equal(one.hamiltonian[name], other.hamiltonian[name])
-        and one.costates[name].error == other.costates[name].error
-        and all(np.array_equal(phase[state], other.costates[name][state]) for state in phase)
-        and np.array_equal(
-            phase.polynomial(one.trajectory[name].time + 0.1), other.costates[name].polynomial(one.trajectory[name].time + 0.1)
-        )
-        for name, phase in one.costates.items()
-    )
-
-
 def test_a_file_has_them(ascents, tmp_path):
     front = ascents.replace(costates=[None, *ascents.costates[1:]])
     front.save(tmp_path / "front.nc")
     loaded = Front.load(tmp_path / "front.nc")
     assert loaded[0].costates is None and loaded[0].weights is None
-    assert all(same(*two) for two in zip(front[1:], loaded[1:], strict=True))
+    assert contents(front) == contents(loaded)
     loaded[2:].save(tmp_path / "again.nc")
-    assert all(same(*two) for two in zip(front[2:], Front.load(tmp_path / "again.nc"), strict=True))
+    assert contents(front[2:].costates) == contents(Front.load(tmp_path / "again.nc").costates)
     phase = loaded.to_xarray("ascent")
     assert phase["costate_of_vy"].dims == phase["hamiltonian"].dims == ("point", "node")
     assert phase["costate_of_vy"].attrs["long_name"] == "costate of vy" and "sum of weights" in phase.attrs["costates"]
@@ -199,31 +182,6 @@ def test_a_file_without_any_has_no_array_of_them(ascents):
     plain = ascents.replace(costates=[None] * len(ascents))
     arrays = {*root_dataset(plain).arrays, *phase_dataset(plain, "ascent").arrays}
     assert not [name for name in arrays if "costate" in name or name in ("hamiltonian", "weights")]
-
-
-@pytest.mark.parametrize(
-    ("name", "change", "why"),
-    [
-        ("ascent/costate_edge_count", 3, "'costate_edge_count' is not that of its elements"),
-        ("ascent/costate_element_count", -1, "'costate_element_count' is not between"),
-        ("ascent/costate_function_count", 99, "'costate_function_count' is not between"),
-        ("ascent/costate_basis", "fourier", "there is no basis 'fourier'"),
-        ("ascent/hamiltonian", None, "'hamiltonian' is missing"),
-        ("ascent/costate_of_y", None, "'costate_of_y' is missing"),
-        ("weights", np.nan, "without weights"),
-        ("weights", None, "without weights"),
-    ],
-)
-def test_a_forged_file_is_refused(ascents, tmp_path, name, change, why):
-    buffer = io.BytesIO(unsealed(files.to_bytes(ascents[:3])))
-    with h5py.File(buffer, "r+") as file:
-        if change is None:
-            del file[name]
-        else:
-            file[name][1] = change
-    (tmp_path / "front.nc").write_bytes(sealed(buffer.getvalue()))
-    with pytest.raises(ValueError, match=why):
-        Front.load(tmp_path / "front.nc")
 
 
 def test_a_state_may_be_called_hamiltonian(tmp_path):
@@ -237,7 +195,7 @@ def test_a_state_may_be_called_hamiltonian(tmp_path):
     front = Front.of(optimize(problem, parse("dfet:2x3"), starts=1).alone())
     front.save(tmp_path / "front.nc")
     loaded = Front.load(tmp_path / "front.nc")
-    assert same(front[0], loaded[0])
+    assert contents(front) == contents(loaded)
     assert loaded.to_xarray("run")["hamiltonian"].values[0, -1] == pytest.approx(1.0)
     assert loaded.to_xarray("run")["costate_hamiltonian"].attrs["long_name"] == "Hamiltonian"
 
@@ -248,7 +206,7 @@ def test_a_mesh_of_its_own_and_two_meshes_in_one_file(tmp_path):
     coarse = optimize(load("standard/car"), parse("multiple-shooting:12"), starts=1).alone()
     front = Front.concatenate([fine, coarse])
     front.save(tmp_path / "front.nc")
-    assert all(same(*two) for two in zip(front, Front.load(tmp_path / "front.nc"), strict=True))
+    assert contents(Front.of(front)) == contents(Front.load(tmp_path / "front.nc"))
 
 
 @pytest.mark.slow
@@ -271,6 +229,4 @@ def test_costates_beside_a_longer_trajectory_without_any_are_saved(tmp_path):
     both = Front.of(Points.concatenate([short.alone(), long.alone().replace(costates=[None])]))
     both.save(tmp_path / "front.nc")
     first, second = Front.load(tmp_path / "front.nc")
-    assert second.costates is None and short.costates is not None
-    for name, values in short.costates["ascent"].items():
-        np.testing.assert_array_equal(first.costates["ascent"][name], values)
+    assert second.costates is None and short.costates is not None and contents(first.costates) == contents(short.costates)

@@ -129,23 +129,7 @@ def test_points_that_are_not_what_they_say_are_not_verified(front):
     assert marked.verified.tolist() == [False, False] + [True] * 8
     assert "evaluated again, its 'near' differs by 0.2" in marked[0].note and marked[0].note.endswith("m2")
     assert "Not verified: evaluated again, these differ by more than 0.001." in marked.table()
-    checks = verify(wrong, tolerance=1e-6)
-    assert [check.ok for check in checks] == [False, False] + [True] * 8
-    moved = front.decision.copy()
-    moved[4, 0] = 1.8
-    beyond = _with(front, moved)
-    (reason,) = [check.reasons for check in verify(beyond, tolerance=1e-6) if not check.ok]
-    assert "violates wall by 2.0e-01" in "; ".join(reason)
-    assert "it violates wall by 2.0e-01" in beyond.verify()[4].note
-    honest = beyond.replace(F=parabolas().compile().evaluate(moved)[0]).verify()
-    assert honest.verified.tolist() == [True] * 4 + [False] + [True] * 5  # its objectives are right, but it is behind the wall
-    moved[4, 0] = 5.0
-    assert _with(front, moved).simulate()[4].violations["bounds of x"] == 1 / 8
-
-
-def _with(front: Front, decision: np.ndarray) -> Front:
-    same = {name: getattr(front, name) for name in ("F", "violation", "status", "goals", "variables", "problem", "stats")}
-    return Front(decision=decision, sort=False, **same)
+    assert [check.ok for check in verify(wrong, tolerance=1e-6)] == [False, False] + [True] * 8
 
 
 def test_other_data_evaluate_the_same_points(front):

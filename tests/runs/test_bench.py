@@ -21,6 +21,7 @@ from runs.bench import published as optima
 from runs.bench.contract import Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
 from runs.cli import main
 from transcription import DFET
+from transcription.stopping import stopping
 
 AROUND = (0.5, 1.0, 3.0)
 """Of which the best, the worst and the mean would say something else than the median, 1."""
@@ -143,7 +144,7 @@ def test_an_interrupt_ends_the_steps():
         steps.begin("first")
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(0.01)
-        assert steps.asked()
+        assert stopping()
         with pytest.raises(Stopped):
             steps.begin("second")
 

@@ -130,7 +130,7 @@ def test_the_command_line_solves_shows_verifies_and_chooses(here, capsys):
     assert f"All {len(front)} points verify: evaluated again" in capsys.readouterr().out
     front.replace(F=front.F * 1.001).save("wrong.nc")
     assert main(["verify", "wrong.nc"]) == 1
-    assert "evaluated again, its objectives differ by" in capsys.readouterr().out
+    assert "evaluated again, its 'cost' differs by" in capsys.readouterr().out
     assert main(["decide", "beam.nc", "--reference", "cost=8", "--json", "choice.json"]) == 0
     out = capsys.readouterr().out
     assert "Only points that are known were ranked" in out and "not at hand" not in out

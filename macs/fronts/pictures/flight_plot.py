@@ -19,6 +19,7 @@ from .style import (
     axis_label,
     beside,
     blank_figure,
+    caption,
     draw_limits,
     figure_title,
     hollow,
@@ -26,8 +27,6 @@ from .style import (
     note_above,
     panel_grid,
     plain,
-    raised,
-    remark,
     rendered,
     styled,
     wrapped,
@@ -108,18 +107,10 @@ def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
         for ax, (name, kind) in zip(axes, panels, strict=True):
             draw_panel(ax, over, name, kind)
         _draw_time_axis(figure, axes, [phase for one in drawn for phase in one.trajectory.phases])
-        named = [wrapped(plain(_words(point)), figure.get_figwidth() - 0.6, 8.0) for point in points]
+        named = [wrapped(plain(f"#{point.index}: {caption(point)}"), figure.get_figwidth() - 0.6, 8.0) for point in points]
         lines = [Line2D([], [], color=one.color, lw=1.5, label=words) for one, words in zip(drawn, named, strict=True)]
         figure.legend(handles=lines, loc="outside upper left", frameon=False)
     return axes
-
-
-def _words(point: Any) -> str:
-    """The point's number, its objectives, and whether it is not feasible, not verified or not simulated."""
-    named = zip(point.goals, point.objectives.values(), strict=True)
-    values = ", ".join(f"{goal.name} {value:.5g} {raised(goal.unit)}".rstrip() for goal, value in named)
-    said = remark(point)
-    return f"#{point.index}: {values}{f'; {said}' if said else ''}"
 
 
 def _draw_time_axis(figure: Any, axes: np.ndarray, phases: Sequence[PhaseTrajectory]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from os import PathLike
 from pathlib import Path
@@ -25,6 +25,7 @@ from .style import (
     axis_number,
     better,
     blank_figure,
+    check_no_path,
     draw_hollow,
     draw_limits,
     figure_title,
@@ -50,23 +51,17 @@ EQUAL_OBJECTIVES = 1e-9
 
 def save_front(front: Any, path: str | PathLike[str]) -> None:
     """Draw a front into a file; the suffix gives the format."""
-    _write(lambda: front_figure(front), path)
+    _write(front_figure(front), path)
 
 
 def save_picture(what: Any, path: str | PathLike[str], **how: Any) -> None:
     """Draw what has a `plot(figure=)`, such as the trajectory of a point, into a file; the suffix gives the format."""
-
-    def drawn() -> Any:
-        figure = blank_figure()
-        what.plot(figure=figure, **how)
-        return figure
-
-    _write(drawn, path)
+    figure = blank_figure()
+    what.plot(figure=figure, **how)
+    _write(figure, path)
 
 
-def _write(drawn: Callable[[], Any], path: str | PathLike[str]) -> None:
-    with styled():
-        figure = drawn()
+def _write(figure: Any, path: str | PathLike[str]) -> None:
     write_whole(path, rendered(figure, Path(path).suffix.lstrip(".").lower(), 200))
 
 
@@ -89,6 +84,7 @@ def draw_front(front: Any, ax: Axes | None = None, marked: Sequence[int] = (), b
     Axes), more as parallel coordinates. Points that did not converge, and those that a simulation did not confirm, are hollow or broken
     lines; none of them is marked as best.
     """
+    check_no_path(ax)
     if len(marked) > len(COLORS):
         raise ValueError(f"at most {len(COLORS)} points can be marked in a picture, not {len(marked)}")
     if beside and len(front.goals) != 2:

@@ -7,7 +7,6 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from os import PathLike
 from typing import Any
 
@@ -65,54 +64,17 @@ def new_figure(width: float, height: float) -> Any:
     try:
         from matplotlib import pyplot
 
-        figure = pyplot.figure(figsize=(width, height), layout="constrained")
+        return pyplot.figure(figsize=(width, height), layout="constrained")
     except ImportError:
         # The backend of the environment needs a display or a toolkit that is not available.
         return blank_figure(width, height)
-    figure.add_axobserver(_number_plainly)
-    return figure
 
 
 def blank_figure(width: float = 5.5, height: float = 4.0) -> Any:
     """A figure without a window, for files."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    figure.add_axobserver(_number_plainly)
-    return figure
-
-
-def _number_plainly(figure: Any) -> None:
-    """Let new axes of a figure have plain numbers: matplotlib sets each as a formula, which takes long."""
-    from matplotlib.ticker import ScalarFormatter
-
-    for ax in figure.axes:
-        for axis in (ax.xaxis, ax.yaxis):
-            if type(axis.get_major_formatter()) is ScalarFormatter:
-                axis.set_major_formatter(_plain_formatter())
-
-
-def _plain_formatter() -> Any:
-    """A formatter of plain numbers; only a power of ten that they share, at the end of the axis, is a formula."""
-    return _formatter_class()(useMathText=False)
-
-
-@cache
-def _formatter_class() -> Any:
-    """Its class, which needs matplotlib to be imported."""
-    from matplotlib.ticker import ScalarFormatter
-
-    class PlainNumbers(ScalarFormatter):
-        def get_offset(self) -> str:
-            self.set_useMathText(True)
-            text = super().get_offset()
-            self.set_useMathText(False)
-            return text
-
-        def __reduce__(self) -> Any:
-            return _plain_formatter, (), self.__dict__
-
-    return PlainNumbers
+    return Figure(figsize=(width, height), layout="constrained")
 
 
 def rendered(figure: Any, suffix: str, dpi: float) -> bytes:
@@ -122,10 +84,11 @@ def rendered(figure: Any, suffix: str, dpi: float) -> bytes:
     return picture.getvalue()
 
 
-def check_no_path(given: Any, call: str) -> None:
-    """Raise ValueError if the name of a file is given where a figure or axes belong; `call` is what is drawn into a file."""
+def check_no_path(given: Any) -> None:
+    """Raise ValueError if the name of a file is given where a figure or axes belong."""
     if isinstance(given, str | PathLike):
-        raise ValueError(f"a picture is drawn into a figure, not into a file: to write one, {call}.figure.savefig({str(given)!r})")
+        remedy = f"to write one, take that of the axes that are returned, as in front.plot().figure.savefig({str(given)!r})"
+        raise ValueError(f"a picture is drawn into a figure, not into a file: {remedy}")
 
 
 def axis_label(name: str, unit: str) -> str:
@@ -209,6 +172,13 @@ def remark(point: Any) -> str:
     return "" if point.verified else NOT_VERIFIED
 
 
+def caption(point: Any) -> str:
+    """The objectives of a point with units as print has them, and the remark on it."""
+    named = zip(point.goals, point.objectives.values(), strict=True)
+    values = ", ".join(f"{goal.name} {value:.6g} {raised(goal.unit)}".rstrip() for goal, value in named)
+    return "; ".join(filter(None, [values, remark(point)]))
+
+
 def draw_hollow(ax: Any, places: np.ndarray, front: Any, size: float, rims: Any = COLORS[0]) -> None:
     """Draw the points that are not verified or not feasible as hollow dots at `places` (2 or 3, n)."""
     _, apart, infeasible = kinds(front)
@@ -230,6 +200,7 @@ def panel_grid(
 ) -> tuple[Any, np.ndarray]:
     """A figure, and the axes of its panels, which share the horizontal axis. Each group of so many panels begins a row; `above` are the
     inches for titles and labels."""
+    check_no_path(figure)
     columns = columns or (1 if groups[0] < 3 else 2 if groups[0] < 9 else 3)
     rows = [-(-count // columns) for count in groups]
     size = panel[0] * columns + 0.4, panel[1] * sum(rows) + above

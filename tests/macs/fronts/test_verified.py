@@ -11,10 +11,13 @@ from synthetic_fronts import black_box
 from macs import MACS, NSGA2, optimize
 from macs.evaluation.blackbox import plain_problem
 from macs.fronts import verified as module
-from macs.fronts.verified import VERIFY, Simulations, accuracy, largest_miss, objective_scales, verified
+from macs.fronts.verified import VERIFY, Simulations, largest_miss, objective_scales, verified
 from problems import Problem
 from problems.compiled import Limit, Variable, verified_scale
 from transcription import DFET, SingleShooting
+
+NEAR = pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+"""A little less than a tolerance, and a little more."""
 
 
 def test_what_agrees_is_verified():
@@ -30,27 +33,24 @@ def test_what_agrees_is_verified():
 # What counts as one
 
 
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
-def test_objectives_are_judged_by_their_ranges_over_the_front(share, good):
-    """Distances from 1 to 3: the tolerance is a hundredth of that range."""
-    front = points(cart(), *constant(0.5, 1.0, 1.5))
-    found = front.replace(F=front.F - [[0.0, 0.0], [share * 0.02, 0.0], [0.0, 0.0]]).verify(0.01)
-    assert found.verified.tolist() == [True, good, True]
-    assert found.notes[1] == ("" if good else "simulated, its 'distance' differs by 0.022 m")
-
-
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
-def test_an_objective_of_a_stated_scale_is_judged_by_that(share, good):
-    front = points(cart(of_objective=50.0), *constant(0.5, 1.0))
-    found = front.replace(F=front.F - [[0.0, 0.05 * share], [0.0, 0.0]]).verify()
-    assert found.verified.tolist() == [good, True]
-
-
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
-def test_an_objective_that_hardly_varies_is_judged_by_its_size(share, good):
-    front = points(cart(), *constant(1.0, 1.0 + 1e-9))
-    assert objective_scales(front) == pytest.approx([2.0, 2.0])
-    assert front.replace(F=front.F - [0.0, 0.002 * share]).verify().verified.tolist() == [good, good]
+@NEAR
+@pytest.mark.parametrize(
+    ("problem", "values", "k", "rows", "scale"),
+    [
+        pytest.param(cart(), (0.5, 1.0, 1.5), 0, [1], 2.0, id="its range over the front"),
+        pytest.param(cart(of_objective=50.0), (0.5, 1.0), 1, [0], 50.0, id="its stated scale"),
+        pytest.param(cart(), (1.0, 1.0 + 1e-9), 1, [0, 1], 2.0, id="its size, if it hardly varies"),
+    ],
+)
+def test_an_objective_is_judged_by(share, good, problem, values, k, rows, scale):
+    front = points(problem, *constant(*values))
+    assert objective_scales(front)[k] == pytest.approx(scale)
+    F = np.array(front.F)
+    F[rows, k] -= share * 1e-3 * scale
+    found = front.replace(F=F).verify()
+    assert [i for i in range(len(front)) if not found.verified[i]] == ([] if good else rows)
+    said = "" if good else f"simulated, its '{front.names[k]}' differs by {1.1e-3 * scale:.2g} {front.units[k]}".rstrip()
+    assert {found.notes[i] for i in rows} == {said}
 
 
 @pytest.mark.parametrize(("off", "good"), [(1e-10, True), (1e-8, False)])
@@ -61,7 +61,7 @@ def test_an_objective_near_zero_is_judged_by_how_much_it_varies_within_the_bound
     assert front.replace(F=[[-2e-7, 2e-14 + off]]).verify().verified.tolist() == [good]
 
 
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+@NEAR
 def test_states_are_judged_by_the_spans_of_their_bounds(share, good):
     """After two seconds x, within [-5, 5], is 0.01 times `share` less than planned."""
     found = slowed(points(cart(of_objective=1e6), *constant(1.0)), 0.005 * share).verify()
@@ -70,7 +70,7 @@ def test_states_are_judged_by_the_spans_of_their_bounds(share, good):
 
 
 @pytest.mark.parametrize("limits", [{"lower": 200.0}, {"lower": 200.0, "upper": 200.0}, {"lower": 200.0, "scale": 0.1}])
-@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+@NEAR
 def test_equalities_and_limits_on_one_side_have_at_least_their_size_as_scale(limits, share, good):
     """By default their scale is 1, and what is 0.2 short of 200 would violate it by 20 %."""
     found = slowed(points(cart(of_objective=1e6, **limits), *constant(1.0)), 1e-3 * share).verify()
@@ -195,11 +195,6 @@ def test_a_tolerance_is_a_positive_number(wrong):
             call(wrong)
 
 
-@pytest.mark.parametrize(("tolerance", "rtol"), [(1e-3, 1e-7), (1e-5, 1e-9), (1e-9, 1e-12), (1.0, 1e-7)])
-def test_the_integrator_is_finer_than_what_it_judges(tolerance, rtol):
-    assert accuracy(tolerance) == pytest.approx((rtol, 0.1 * rtol))
-
-
 # After a search
 
 
@@ -229,49 +224,26 @@ def test_tables_set_apart_what_is_not_verified():
 # Simulations that are made once
 
 
-@pytest.fixture
-def simulated(monkeypatch) -> list:
-    """The trajectories that are simulated, in their order."""
+def test_a_trajectory_is_simulated_once(monkeypatch):
+    """Also if others judge it by other ranges; one that was made elsewhere serves."""
     seen, simulate_all = [], module.simulate_all
-
-    def counted(problem, trajectories, **about):
-        seen.extend(trajectories)
-        return simulate_all(problem, trajectories, **about)
-
-    monkeypatch.setattr(module, "simulate_all", counted)
-    return seen
-
-
-def test_a_trajectory_is_simulated_once(simulated):
+    monkeypatch.setattr(module, "simulate_all", lambda problem, those, **about: seen.extend(those) or simulate_all(problem, those, **about))
     front = points(cart(), *constant(0.5, 1.0, 1.5))
     simulations = Simulations(front.compiled(), VERIFY)
     first = verified(front[[0, 2]], VERIFY, simulations=simulations)
-    assert len(simulated) == 2
+    assert len(seen) == 2
     every = verified(front, VERIFY, simulations=simulations)
-    assert len(simulated) == 3 and simulated[2] is front.trajectories[1]
+    assert len(seen) == 3 and seen[2] is front.trajectories[1]
     again = verified(every[::-1], VERIFY, simulations=simulations)
-    assert len(simulated) == 3 and first.verified.all() and again.verified.all()
+    assert first.verified.all() and again.verified.all()
     np.testing.assert_array_equal(again.simulated_F[::-1], every.simulated_F)
-    alone = front.verify()
-    assert len(simulated) == 6 and alone.simulated_F == pytest.approx(every.simulated_F, rel=1e-9)
-
-
-def test_objectives_are_judged_anew_by_other_ranges_without_a_simulation(simulated):
-    """One that is off by a tenth of the whole range is right in units of it that are a thousand times as large."""
-    front = points(cart(), *constant(0.5, 1.0, 1.5))
     wrong = front.replace(F=front.F + np.array([[0.0, 0.0], [0.2, 0.0], [0.0, 0.0]]))
-    simulations = Simulations(front.compiled(), VERIFY)
     assert verified(wrong, VERIFY, simulations=simulations).verified.tolist() == [True, False, True]
-    assert verified(wrong, VERIFY, np.full(2, 1e3), simulations=simulations).verified.all() and len(simulated) == 3
-
-
-def test_a_simulation_that_was_made_elsewhere_serves(simulated):
-    front = points(cart(), *constant(1.0))
-    simulations = Simulations(front.compiled(), VERIFY)
-    other = slowed(front, 0.1)
-    simulations.keep(front.trajectories[0], simulations([other.trajectories[0]])[0])
-    found = verified(front, VERIFY, simulations=simulations)
-    assert len(simulated) == 1 and found.simulated_F[0] == pytest.approx([-1.8, 1.62])
+    assert verified(wrong, VERIFY, np.full(2, 1e3), simulations=simulations).verified.all() and len(seen) == 3
+    slow = slowed(front[[1]], 0.1)
+    simulations.keep(slow.trajectories[0], simulations([front.trajectories[1]])[0])
+    assert verified(slow, VERIFY, simulations=simulations).simulated_F == pytest.approx(every.simulated_F[[1]]) and len(seen) == 3
+    assert front.verify().simulated_F == pytest.approx(every.simulated_F, rel=1e-9) and len(seen) == 6
 
 
 def test_the_largest_miss_is_what_is_compared_with_the_tolerance():
