@@ -59,8 +59,7 @@ QUICK = {
     "dfet:20x3:bernstein": "hang_glider",
     "dfet:3x5:bernstein:3": "sounding_rocket",
     "dfet:3x8": "isoperimetric",
-    "dfet:40x3:bernstein:1": "batch_reactor car catalyst_mixing fast_oscillator jacobson lotka_fishing moon_landing orbit_raising "
-    "tumour two_link_arm",
+    "dfet:40x3:bernstein:1": "batch_reactor car catalyst_mixing fast_oscillator jacobson lotka_fishing moon_landing tumour two_link_arm",
     "dfet:8x3:bernstein": "linear_tangent newton_nose schwartz zermelo",
 }
 """By mesh."""
@@ -71,7 +70,7 @@ SLOW = {
     "dfet:20x3:bernstein": "tuberculosis",
     "dfet:30x4": "climb",
     "dfet:30x4:bernstein": "plane_change",
-    "dfet:40x3:bernstein:1": "reorientation robot_arm",
+    "dfet:40x3:bernstein:1": "orbit_raising reorientation robot_arm",
     "dfet:5x4": "delta_iii",
     "dfet:60x5": "hypersensitive",
     "dfet:8x3:bernstein": "aly_chan",
