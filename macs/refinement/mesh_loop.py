@@ -13,7 +13,7 @@ from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
 from transcription.meshed import Meshed
 from transcription.meshes.errors import objective_variations
-from transcription.meshes.moving_edges import at_switches, switched
+from transcription.meshes.moving_edges import switched
 from transcription.meshes.refinement import next_method, redistributed
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
 from transcription.nlp.scalarized import Solved
@@ -100,11 +100,10 @@ class OnMesh:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A mesh to try, whether its result counts only as an improvement, and whether the first solve stays near the present point."""
+    """A mesh to try, and whether its result counts only as an improvement."""
 
     method: Meshed
     better: bool = False
-    near: bool = False
 
 
 @dataclass(eq=False)
@@ -254,11 +253,9 @@ class MeshLoop:
         knots = switched(present.method, self.problem, present.trajectory) if knotted else None
         if knots is not None and knots not in seen:
             yield Proposal(knots, better=True)
-        resting = at_switches(present.method, present.trajectory)
-        begun = present.method.settled(present.trajectory) if resting is None else resting
-        finer = next_method(begun, present.verdict, present.trajectory)
+        finer = next_method(present.method.settled(present.trajectory), present.verdict, present.trajectory)
         if finer not in seen:
-            yield Proposal(finer, near=resting is not None)
+            yield Proposal(finer)
             yield from map(Proposal, finer.alternatives())
 
     def _solved(
@@ -267,7 +264,7 @@ class MeshLoop:
         """The point on another mesh, None if no solve converged; and its status."""
         method = proposal.method
         nlp = self.programs(method)
-        solved, by_gradients = self._from_starts(nlp, present, task, others, least, proposal.near)
+        solved, by_gradients = self._from_starts(nlp, present, task, others, least)
         if solved.status != CONVERGED:
             return None, solved.status
         z, F = solved.z, solved.F
@@ -276,17 +273,15 @@ class MeshLoop:
         change = np.inf if method == present.method else _change(present, F, task, self.wanted.settled)
         return replace(reached, change=change), solved.status
 
-    def _from_starts(
-        self, nlp: NLP, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float, near_first: bool
-    ) -> tuple[Solved, bool]:
-        """The best result of solves from the present trajectory and, if that fails or gets worse, near it (or in reverse order), then from
+    def _from_starts(self, nlp: NLP, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float) -> tuple[Solved, bool]:
+        """The best result of solves from the present trajectory and, if that fails or gets worse, near it, then from
         other starts; and whether it is an optimum. For objectives without derivatives (a maximised peak), the feasible point nearest to the
         present one."""
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
         slip = min(LOOP.slip * self.wanted.settled, LOOP.drift)
-        own = [(present.trajectory, near_first, slip), (present.trajectory, not near_first, LOOP.drift)]
+        own = [(present.trajectory, False, slip), (present.trajectory, True, LOOP.drift)]
         attempts = [*own, *((other, False, LOOP.drift) for other in others)]
         starts = (Start(nlp.interpolate(trajectory), near, drift) for trajectory, near, drift in attempts)
         return best_of(task, self.solves, nlp, starts, bound), True

@@ -16,7 +16,6 @@ from transcription.meshes.moving_edges import (
     LOWER,
     UPPER,
     Switch,
-    at_switches,
     contacts,
     edge_places,
     phase_switches,
@@ -369,17 +368,6 @@ def test_an_edge_that_can_go_no_further_begins_anew():
     problem, method, flight = flown((0, 0.25, 0.5, 0.75, 1), (2,), [full, full, [3.0, 1.5, 0.0], off], [0.5])
     (found,) = phase_switches(flight["fall"])["u"]
     assert found.place == pytest.approx(0.625, abs=0.01) and switched(method, problem, flight) is None
-
-
-def test_edges_begin_at_the_switches_that_they_have_left():
-    off, full, falling = [0.0, 0.0, 0.0], [3.0, 3.0, 3.0], [3.0, 1.5, 0.0]
-    _, method, flight = flown((0, 0.25, 0.5, 0.75, 1), (2,), [full, full, falling, off], [0.5])
-    (found,) = phase_switches(flight["fall"])["u"]
-    mesh = at_switches(method, flight).mesh_of("fall")
-    assert mesh.edges == pytest.approx((0, found.place / 2, found.place, (1 + found.place) / 2, 1), abs=1e-12) and found.place > 0.6
-    # At its switch an edge stays exactly.
-    _, method, flight = flown((0, 0.5, 1), (1,), [off, full], [0.8], {"u": (0, 1)})
-    assert at_switches(method, flight) == method.settled(flight) != method
 
 
 def test_moving_edges_stay_when_elements_are_cut():
