@@ -14,11 +14,9 @@ import numpy as np
 
 from problems.checks import check_count, check_positive
 from transcription import from_dict
-from transcription.base import NLP
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.optimality import optimality
-from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
@@ -28,10 +26,10 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..gradients.ends import moved_along
-from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised, Start, best_of
+from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised
 from ..io.console import working
 from ..pareto.dominance import extremes
-from .mesh_loop import LOOP, MeshLoop, OnMesh, Programs, Refinement, differentiable
+from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
 
 
 @dataclass(frozen=True)
@@ -54,21 +52,6 @@ class FrontLimits:
 FRONT = FrontLimits()
 NOT_BEGUN = "it was not solved on a finer mesh"
 """Note of a point that was still to be refined when the work was to end."""
-
-
-def front_tasks(
-    F: np.ndarray, ends: Mapping[int, LexicographicEnd], between: Sequence[int], units: np.ndarray, done: Mapping[int, np.ndarray]
-) -> Iterator[tuple[int, Scalarised]]:
-    """Rows of a front F (k, m) with their tasks on another mesh: the ends first, then the points between them, nearest to a `done` point
-    first. The caller fills `done`, row -> objectives (m,). If the ends have moved, the references of the others move along."""
-    yield from ends.items()
-    known = [i for i in ends if i in done]
-    known = known if len(known) == len(units) else []
-    references, weights = moved_along(F[list(between)], F[known], np.array([done[i] for i in known]).reshape(-1, len(units)), units)
-    left = dict(zip(between, references, strict=True))
-    while left:
-        i = min(left, key=lambda j: min((float(np.linalg.norm((F[j] - F[k]) / units)) for k in done), default=0.0))
-        yield i, Scalarised(left.pop(i), weights, units=units)
 
 
 def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool | None, more: bool = True) -> Points:
@@ -104,19 +87,19 @@ class FrontRefinement:
         limit: int,
         chosen: Sequence[int] | None = None,
         most_work: float | None = None,
-        knots: bool = True,
         programs: Programs | None = None,
         enough: Callable[[OnMesh], bool] | None = None,
         max_iterations: int = MOST_ITERATIONS,
         more: bool = True,
+        first: Meshed | None = None,
     ) -> None:
         self.front, self.wanted = front, wanted
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])), max_iterations)
-        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, knots, enough, more)
+        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, True, enough, more)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
-        self._most_work = most_work
+        self._most_work, self._first = most_work, first
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}
 
@@ -133,14 +116,25 @@ class FrontRefinement:
         nlp = self.loop.programs(self.methods[first])
         self.units = self.loop.units(self.front.F[self.good], nlp, self.front[first].decision)
         ends = self._ends()
-        between, found = [i for i in self.chosen if i not in ends], dict[int, np.ndarray]()
-        for i, task in front_tasks(self.front.F, ends, between, self.units, found):
+        between = [i for i in self.chosen if i not in ends]
+        for i, task in self._tasks(ends, between):
             if self.loop.ended:
                 return
-            what = f"end {len(found) + 1} of {len(ends)}" if i in ends else f"point {len(found) + 1} of {len(self.chosen)}"
-            show(f"meshes of the front: {what}")
+            done = len(self.found) + 1
+            show(f"meshes of the front: {f'end {done} of {len(ends)}' if i in ends else f'point {done} of {len(self.chosen)}'}")
             self._refine(i, task)
-            found[i] = self.found[i].best.F
+
+    def _tasks(self, ends: Mapping[int, LexicographicEnd], between: Sequence[int]) -> Iterator[tuple[int, Scalarised]]:
+        """Rows with their tasks on another mesh: ends first, then the points between, which move along with these, from the nearest on."""
+        yield from ends.items()
+        F, m = self.front.F, len(self.units)
+        known = [i for i in ends if i in self.found] if len(ends) == m else []
+        moved = np.array([self.found[i].best.F for i in known]).reshape(-1, m)
+        references, weights = moved_along(F[between], F[known], moved, self.units)
+        left = dict(zip(between, references, strict=True))
+        while left:
+            i = min(left, key=lambda j: min((self._distance(j, k) for k in self.found), default=0.0))
+            yield i, Scalarised(left.pop(i), weights, units=self.units)
 
     def points(self, elapsed: float, stopped: str) -> Points:
         """The front with the refined points, in the same order, and their costs."""
@@ -205,7 +199,7 @@ class FrontRefinement:
         begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, self.units, known)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[: FRONT.neighbours]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
-        near_meshes = self._meshes_near(done, begun.verdict.error, task)
+        near_meshes = [self._first] if self._first else self._meshes_near(done, begun.verdict.error, task)
         # Rough controls would need finer meshes than optimal ones.
         own = [] if known or near_meshes else [self.methods[i]]
         hints = list(dict.fromkeys([*near_meshes, *own]))
@@ -242,69 +236,3 @@ class FrontRefinement:
         found = certified(nlp, best.z[None], self.units) if best.by_gradients else {}
         about: dict[str, Any] = {**found, "notes": [note], "trajectories": [best.trajectory]}
         return from_vectors(nlp, best.z[None], front.solver, front.stats, **about)
-
-
-def solve_on(
-    points: Points, rows: Sequence[int], fine: Meshed, programs: Programs, show: Callable[[str], None] = lambda words: None
-) -> Points:
-    """The points in their order; those in `rows` are re-solved on one mesh where that succeeds, and not simulated.
-
-    Nothing is simulated in between: a simulation of all takes less time than those of one after the other.
-    """
-    if not (rows and differentiable(points.compiled())):
-        return points
-    # Asked to end, what was not solved stays as it was.
-    with suppress(Stopped):
-        job = _FineFront(points, rows, programs(fine), GradientSolves(float(points.stats["tolerance"])))
-        job.go(show)
-        return job.points()
-    return points
-
-
-class _FineFront:
-    """The points of a front on one mesh; `done` is row -> result."""
-
-    def __init__(self, points: Points, rows: Sequence[int], nlp: NLP, solves: GradientSolves) -> None:
-        self.front, self.rows, self.nlp, self.solves = points, list(rows), nlp, solves
-        self.done: dict[int, Solved] = {}
-        self.units = MeshLoop.units(points.F[self.rows], nlp, self._start(self.rows[0]))
-
-    def go(self, show: Callable[[str], None]) -> None:
-        """Solve all points, until the work has to end."""
-        F, ends = self.front.F, dict[int, LexicographicEnd]()
-        for objective, k in enumerate(extremes(F[self.rows])):
-            ends.setdefault(self.rows[k], LexicographicEnd.of(objective, self.units, F[self.rows[k]]))
-        between, found = [i for i in self.rows if i not in ends], dict[int, np.ndarray]()
-        for i, task in front_tasks(F, ends, between, self.units, found):
-            # Of the ends all are begun, so that what is between them is not taken for an end.
-            if stopping() and i not in ends:
-                break
-            self._solve(i, task, show)
-            found |= {i: self.done[i].F} if i in self.done else {}
-
-    def points(self) -> Points:
-        """The front with the finished points, and their costs."""
-        front, done = self.front, list(self.done)
-        Z = np.array([self.done[i].z for i in done]).reshape(-1, len(self.nlp.variables))
-        found = from_vectors(self.nlp, Z, front.solver, front.stats, sort=False, **certified(self.nlp, Z, self.units))
-        rows = [found[[done.index(i)]] if i in self.done else front[[i]] for i in range(len(front))]
-        stats = more_costs(front.stats, self.solves.counts, 0.0, "")
-        return Points.concatenate(rows).replace(solver=front.solver, stats=stats, message=front.message)
-
-    def _solve(self, i: int, task: Scalarised, show: Callable[[str], None]) -> None:
-        """Solve one point from its own trajectory and, if that fails or gets worse, from its neighbours on this mesh."""
-        show(f"points on a finer mesh: {len(self.done) + 1} of {len(self.rows)}")
-        near = sorted(self.done, key=lambda j: self._distance(i, j))[: FRONT.neighbours]
-        starts = (Start(z, drift=LOOP.drift) for z in (self._start(i), *(self.done[j].z for j in near)))
-        with self.solves.at_most(FRONT.patience):
-            best = best_of(task, self.solves, self.nlp, starts, task.loss(self.front.F[i]))
-        if best.status == CONVERGED:
-            self.done[i] = best
-
-    def _start(self, i: int) -> np.ndarray:
-        trajectory = self.front.trajectories[i]
-        assert trajectory is not None
-        return self.nlp.interpolate(trajectory)
-
-    def _distance(self, i: int, j: int) -> float:
-        return float(np.linalg.norm((self.front.F[i] - self.front.F[j]) / self.units))

@@ -24,7 +24,7 @@ from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..io.console import working
 from ..pareto.dominance import extremes
 from ..pareto.spread import Guide, spread
-from .front_refinement import FrontRefinement, solve_on
+from .front_refinement import FrontRefinement
 from .mesh_loop import OnMesh, Programs, differentiable
 
 
@@ -111,13 +111,12 @@ class _Mending:
     def resolve_unverified(self, fine: Meshed | None = None) -> Points:
         """The points in their order; `points` itself if none was solved."""
         again = self.points
-        if fine is not None:
-            every = self._meshed(again, np.ones(len(again), dtype=bool))
-            again = self.marked(solve_on(again, every, fine, self.programs, self.show))
-        elif not again.was_simulated.any():
+        if not again.was_simulated.any():
             again = self.points = self.marked(again)
-        again = tried = self._inside(again, _slightly_outside(again, self.verify), MENDING.loss)
-        again = self._refined(again, self._meshed(again, again.was_simulated & ~again.verified))
+        tried = again
+        if fine is None:
+            again = tried = self._inside(again, _slightly_outside(again, self.verify), MENDING.loss)
+        again = self._refined(again, self._meshed(again, again.was_simulated & ((fine is not None) | ~again.verified)), fine)
         # On a finer mesh, too, a point may exceed limits between nodes, and by less.
         moved = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
         again = self._as_before(self._inside(again, moved, MENDING.loss))
@@ -162,8 +161,8 @@ class _Mending:
         rows = rows & (points.status == CONVERGED)
         return [i for i in np.flatnonzero(rows).tolist() if isinstance(from_dict(points[i].transcription or {}), Meshed)]
 
-    def _refined(self, points: Points, rows: list[int]) -> Points:
-        """The points with some of them on finer meshes of their own, as far as the work allows; simulated."""
+    def _refined(self, points: Points, rows: list[int], fine: Meshed | None) -> Points:
+        """The points with some of them on a `fine` mesh, or finer ones of their own, as far as the work allows; simulated."""
         if not rows:
             return points
         limits = MENDING.part * self.verify
@@ -173,10 +172,8 @@ class _Mending:
         def enough(point: OnMesh) -> bool:
             return largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
 
-        most = self._most_work(points, len(rows))
-        job = FrontRefinement(
-            points, wanted, MENDING.meshes, rows, most, programs=self.programs, enough=enough, max_iterations=MENDING.patience
-        )
+        most = self._most_work(points, len(rows), fine)
+        job = FrontRefinement(points, wanted, MENDING.meshes, rows, most, self.programs, enough, MENDING.patience, first=fine)
         job.go(self.show)
         if wanted.accuracy <= accuracy(self.verify)[0]:
             for found in job.found.values():
@@ -185,13 +182,13 @@ class _Mending:
         # What refinement would wish for besides is no complaint about a point that is verified.
         return again.replace(notes=["" if i in job.found and again.verified[i] else note for i, note in enumerate(again.notes)])
 
-    def _most_work(self, points: Points, count: int) -> float | None:
+    def _most_work(self, points: Points, count: int, fine: Meshed | None = None) -> float | None:
         """The work left for so many points, in iterations times variables; None (no limit) where there was no search, so that the mesh is
         the only task."""
         if not points.stats["evaluations"]:
             return None
         spent = points.stats.get("work", 0) - self._work + WORK.building * self.programs.built
-        size = float(np.mean([len(variables) for variables in points.places]))
+        size = float(np.mean([len(variables) for variables in points.places])) if fine is None else len(self.programs(fine).variables)
         return max(MENDING.share * self._work - spent, MENDING.each * count * size, MENDING.least)
 
 
