@@ -341,16 +341,16 @@ class _Job:
             found = search.best(0)
             self._stopped = interrupts.reason
             points = from_vectors(
-                found.program,
+                found.nlp,
                 found.z[None],
                 self._about,
                 self._stats() | {"starts": found.rule.converged, "optima": found.optima, "found": found.hits},
                 status=[found.status],
                 notes=[found.note],
-                **certified(found.program, found.z[None], None, self._sole),
+                **certified(found.nlp, found.z[None], None, self._sole),
             )
             if found.status == INFEASIBLE:
-                points = points.replace(notes=[f"{found.note}; {conflict(found.program, points[0])}"])
+                points = points.replace(notes=[f"{found.note}; {conflict(found.nlp, points[0])}"])
             return Front.of(points).verify(verify)
 
     def swept(self, points: int, method: str) -> Front:

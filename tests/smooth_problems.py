@@ -55,6 +55,19 @@ def slide(limit: float | None = None) -> Problem:
     return problem
 
 
+def time_against_effort() -> Problem:
+    """From rest to rest over a distance of 1 in a time T: the least effort is 12 / T^3."""
+    problem = Problem("cart")
+    move = problem.phase("move", t0=0.0, tf=(1.0, 2.0))
+    move.state("x", bounds=(-1, 2), initial=0, final=1)
+    v = move.state("v", bounds=(-5, 5), initial=0, final=0)
+    u = move.control("u", bounds=(-20, 20))
+    move.dynamics(x=v, v=u)
+    problem.minimize("time", move.tf)
+    problem.minimize("effort", move.integral(u**2))
+    return problem
+
+
 def shuttle(tf: object = (1.0, 3.0)) -> Problem:
     """From rest to rest over a distance of 1: least time against least largest thrust, which is 4/tf^2 (bang-bang)."""
     problem = Problem("shuttle")

@@ -126,9 +126,9 @@ class StageSolver:
             search = MeshSearch(loop, [MINIMUM], given, 1, self.rng)
             search.go(meshes)
             found = search.best(0)
-            own = found.program.transcription.transcribe(self.problem)
-            solution = self._solution(stage, True, derived, found.program, own, found.z, found.status, found.note)
-            if widened == WIDENINGS or found.status != CONVERGED or not self._widened(derived, found.program, found.z):
+            own = found.nlp.transcription.transcribe(self.problem)
+            solution = self._solution(stage, True, derived, found.nlp, own, found.z, found.status, found.note)
+            if widened == WIDENINGS or found.status != CONVERGED or not self._widened(derived, found.nlp, found.z):
                 break
         return solution
 
@@ -204,7 +204,7 @@ class StageSolver:
                 if not found:
                     raise
                 break
-        return solver.better(found, MINIMUM)
+        return min(found, key=MINIMUM.rank)
 
     def _solution(
         self, stage: Stage, first: bool, derived: Valued, nlp: NLP, own: NLP, z: np.ndarray, status: str, note: str

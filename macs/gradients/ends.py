@@ -14,7 +14,7 @@ from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED
 from ..pareto.directions import divisions_below, simplex_lattice
-from .multistart import MULTISTART, MultistartSolver, alpha_of
+from .multistart import MULTISTART, MultistartSolver
 from .scalarised import WORK, Scalarised
 
 METHODS = ("pascoletti-serafini", "epsilon")
@@ -43,11 +43,9 @@ ENDS = EndsLimits()
 
 
 def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved] | None = None) -> list[Solved]:
-    """The lexicographic optimum of each objective: its least value, then those of the others in their order.
-
-    Each is without a loss in those before, or, where no solve achieves that, with a loss of `EndsLimits.slack`. It begins at the optimum of
-    the objective alone, `single(i)`, and is also sought from the ends of the others: they are found in different valleys.
-    """
+    """The lexicographic optimum of each objective, from its optimum alone, `single(i)`, and from the ends of the others, which may lie in
+    other valleys: its least value, then those of the others in their order, without a loss in those before, or one of
+    `EndsLimits.slack`."""
     m = len(solver.nlp.problem.goals)
     optima, tried = list[Solved](), dict[tuple[int, int], np.ndarray]()
     for i in range(m):
@@ -67,11 +65,8 @@ def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved]
 
 
 def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict[tuple[int, int], np.ndarray]) -> None:
-    """Replace optima of single objectives by better ones, from short solves that start at the other optima, until none improves.
-
-    `tried` has the objectives of the optimum k from which objective i was sought before, by (i, k); a solve from another one like it is
-    not worth its time.
-    """
+    """Replace optima of single objectives by better ones, from short solves that start at the other optima, until none improves; not from
+    optima k like those from which objective i was sought before, whose objectives `tried` has by (i, k)."""
     m, scales = len(optima), nlp_scales(solver.nlp)
     for _ in range(ENDS.rounds):
         improved = False
@@ -118,10 +113,8 @@ def _tied(
     solver: MultistartSolver, j: int, best: Solved, ceiling: np.ndarray, spans: np.ndarray, optimum: Solved
 ) -> tuple[Solved, np.ndarray]:
     """The least value of objective j under a ceiling (m,), which `best` attains, also from the `optimum` of j alone; and the ceiling, with
-    `EndsLimits.slack` where it was needed.
-
-    Often there is only one such point: the feasible set has no interior then, and a solve takes long without improving anything.
-    """
+    `EndsLimits.slack` where it was needed."""
+    # Often there is only one such point: the feasible set has no interior then, and a solve takes long without improving anything.
     alone, large = Scalarised.single(j, len(spans), ceiling), ENDS.loose * abs(best.F[j] - optimum.F[j])
     small = len(best.z) <= ENDS.small
     with solver.solves.at_most(ENDS.ties if small else ENDS.soon):
@@ -181,10 +174,7 @@ def _gone_on(solver: MultistartSolver, solved: Solved, enough: float, task: Scal
 
 
 def _worth(solved: Solved, j: int, slack: np.ndarray) -> float:
-    """The gain in objective j that slacks (m,) of the other objectives explain: their multipliers at the optimum are its slopes.
-
-    Where the front is vertical, the gain is as the square root of the slack, twice what the slope says.
-    """
+    """The gain in objective j that slacks (m,) of others explain: their multipliers are its slopes; the root of a slack is twice that."""
     assert solved.multipliers is not None
     return float(2 * solved.multipliers[: len(slack)] @ slack / solved.multipliers[j])
 
@@ -195,16 +185,13 @@ def _spans(optima: Sequence[Solved]) -> np.ndarray:
 
 
 def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[Solved]:
-    """The results of all tasks, in their order.
-
-    A result that is better for another task than that task's own result becomes a start for it. With several starts, each task is also
-    solved from the result of the next one. If the solver is to make as many starts as pay, all tasks get others in turn, as long as these
-    find better results, and take no more work than the tasks themselves, or little.
-    """
+    """The results of all tasks, in their order: also from results of others that are better for them and, with several starts, from that of
+    the next one; with as many starts as pay, from others in turn, as long as these find better ones and take no more work than the
+    tasks."""
     before, found = solver.solves.counts.work, [solver.solve(task) for task in tasks]
     if (solver.starts or 1) > 1:
         for k in range(len(tasks) - 2, -1, -1):
-            found[k] = solver.better([found[k], solver.from_vector(found[k + 1].z, tasks[k])], tasks[k])
+            found[k] = min(found[k], solver.from_vector(found[k + 1].z, tasks[k]), key=tasks[k].rank)
     _from_rivals(solver, tasks, found)
     if solver.starts is None:
         limit = solver.solves.counts.work + max(WORK.little, solver.solves.counts.work - before)
@@ -216,11 +203,8 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
 def _from_rivals(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved]) -> None:
     """Replace results by better ones, from solves that start at the results of other tasks, as long as any improves."""
     for _ in range(ENDS.from_rivals):
-        rivals = [solver.rival(solved, task) for solved, task in zip(found, tasks, strict=True)]
-        for k, rival in enumerate(rivals):
-            if rival is not None:
-                found[k] = solver.from_rival(rival, found[k], tasks[k])
-        if all(rival is None for rival in rivals):
+        before, found[:] = found[:], [solver.from_rival(solved, task) for solved, task in zip(found, tasks, strict=True)]
+        if all(one is other for one, other in zip(before, found, strict=True)):
             break
 
 
@@ -232,7 +216,7 @@ def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], fo
             return False
         with solver.solves.at_most(MULTISTART.iterations):
             other = solver.from_drawn(task, found[k] if found[k].status == CONVERGED else None)
-        alpha, known = alpha_of(task, other), alpha_of(task, found[k])
+        alpha, known = task.optimum(other), task.optimum(found[k])
         if alpha is not None and (known is None or alpha < known - MULTISTART.clearly):
             found[k], replaced = other, True
     return replaced
@@ -279,10 +263,8 @@ def _at_limits(ends: np.ndarray, ranges: np.ndarray, points: int) -> list[Scalar
 
 
 def moved_along(F: np.ndarray, old: np.ndarray, new: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """References and weights with which the points of a front are re-solved.
-
-    References are the points themselves or, if the ends have moved, the same places between these. F (k, m), old, new (m, m), units (m,).
-    """
+    """References and weights with which points F (k, m) of a front are re-solved: the points themselves or, if the ends have moved from
+    `old` to `new` (m, m), the same places between these."""
     if not len(old) or len(units) == 1 or np.abs((new - old) / units).max() <= ENDS.moved:
         return F, units
     before, after = np.ptp(old, axis=0), np.ptp(new, axis=0)

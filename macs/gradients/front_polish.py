@@ -31,7 +31,7 @@ from ..fronts.provenance import more_costs
 from ..fronts.verified import simulated, unmarked
 from ..io.console import working
 from ..pareto.archive import Archive
-from ..pareto.dominance import nondominated, ranges
+from ..pareto.dominance import ranges
 from ..pareto.spread import Guide, spread
 from .polish import BudgetedSolves, polish
 
@@ -83,7 +83,10 @@ def polished(
             evaluator.before_batch = lambda: show("polish: points that are infeasible when simulated are solved again")
             Z, feasible, moved = back_off(evaluator, Z, ranges(archive.F), verify)
             Z, moved = Z[feasible], moved[feasible]
-            known, unseen = feasible_when_simulated(nlp.evaluate(Z)[0], known, verify)
+            try:
+                known = known[simulated(known, None, verify, *_accuracy(verify), "DOP853").status == CONVERGED]
+            except Stopped:
+                unseen = len(known)
         show(f"polish: optimality of {len(Z)} points")
         # A point that was moved inside its limits is no optimum of the problem as stated: it has no certificate.
         columns = {name: iter(values) for name, values in certified(nlp, Z[~moved], ranges(archive.F)).items()}
@@ -161,24 +164,6 @@ def _by_row(violations: Mapping[str, float], labels: Sequence[str]) -> np.ndarra
     """Excess (r,) in each row of the constraints; 0 for a constraint that a simulation does not evaluate."""
     excess = np.array([violations.get(label, 0.0) for label in labels])
     return np.where(np.isfinite(excess), np.maximum(excess, 0.0), 0.0)
-
-
-def feasible_when_simulated(found: np.ndarray, known: Points, verify: float) -> tuple[Points, int]:
-    """The known points that are feasible when simulated, and the number of points not simulated because the work has to end; points that
-    `found` (k, m) dominates are not simulated."""
-    feasible, seen = np.ones(len(known), dtype=bool), np.zeros(len(known), dtype=bool)
-    while True:
-        rows = np.flatnonzero(feasible)
-        apart = nondominated(np.vstack([found, known.F[rows]]))[len(found) :]
-        look = rows[apart & ~seen[rows]]
-        if not len(look):
-            return known[rows], 0
-        rtol, atol = _accuracy(verify)
-        try:
-            feasible[look] = simulated(known[look], None, verify, rtol, atol, "DOP853").status == CONVERGED
-        except Stopped:
-            return known[rows], len(look)
-        seen[look] = True
 
 
 def _accuracy(verify: float) -> tuple[float, float]:

@@ -10,6 +10,7 @@ Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimiza
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from transcription.nlp.derivatives import linear_objectives, objective_gradients
 from transcription.nlp.program import nlp_scales
 from transcription.nlp.scalarized import Solved
 from transcription.smooth import Smooth
-from transcription.stopping import stopping
+from transcription.stopping import Stopped, stopping
 
 from ..evaluation.evaluator import CONVERGED
 from .scalarised import WORK, GradientSolves, Scalarised
@@ -160,10 +161,8 @@ class MultistartStopping:
 
 
 class MultistartSolver:
-    """Solver of scalarised problems of one NLP, each from its best known vector and from other starts; given (k, n).
-
-    With `starts` None, an optimum of one objective is sought from as many starts as pay; see `MultistartStopping`.
-    """
+    """Solver of scalarised problems of one NLP, each from its best known vector and from `starts`, None for as many as pay; given (k,
+    n)."""
 
     def __init__(
         self,
@@ -196,7 +195,7 @@ class MultistartSolver:
         found = [] if first is None else [self.from_vector(first, task)]
         for _ in range((self.starts or 1) - len(found)):
             found.append(self.from_drawn(task))
-        return self.better(found, task)
+        return min(found, key=task.rank)
 
     def single(self, i: int) -> Solved:
         """The optimum of objective i alone. A solve from the best known vector may fail if that is an optimum of another objective within
@@ -209,42 +208,42 @@ class MultistartSolver:
             solved = self.seek(task, self.stopping[i])
         else:
             solved = self.solve(task)
-        if (rival := self.rival(solved, task)) is not None:
-            solved = self.from_rival(rival, solved, task)
+        solved = self.from_rival(solved, task)
         for start in self._known[: self._given] if solved.status != CONVERGED and not self.closest else ():
-            solved = self.better([solved, self.from_vector(start, task)], task)
+            solved = min(solved, self.from_vector(start, task), key=task.rank)
         return solved
 
     def seek(self, task: Scalarised, stopping_rule: MultistartStopping) -> Solved:
         """The best result of a multistart: further starts end when they have taken a little work, or as much as the first one."""
         before = self.solves.counts.work
-        best = self.with_feasible_start(self.solve(task), task)
-        limit = self.solves.counts.work + max(WORK.little, self.solves.counts.work - before)
-        stopping_rule.add(alpha_of(task, best))
-        while not (
-            stopping_rule.enough
-            or self.closest
-            or self.drawn_enough
-            or self.solves.counts.work >= limit
-            or stopping()
-            or self.is_least(best, task)
-        ):
-            # Where none has converged yet, they may all take long.
-            converged = stopping_rule.converged
-            with self.solves.at_most(MULTISTART.iterations if converged else self.solves.max_iterations):
-                found = self.from_drawn(task, best if converged else None)
-            # One that is hardly better is the same optimum: that of the first start is as good.
-            if stopping_rule.add(alpha_of(task, found)) or (not stopping_rule.converged and found.violation < best.violation):
-                best = found
-        return best
+        first = self.with_feasible_start(self.solve(task), task)
+        stopping_rule.add(task.optimum(first))
+        return self.drawn(first, task, stopping_rule, max(WORK.little, self.solves.counts.work - before))[0]
+
+    def drawn(self, best: Solved, task: Scalarised, stopping_rule: MultistartStopping, work: float) -> tuple[Solved, list[Solved]]:
+        """The best result, one of which is known, and those of drawn starts, until there are enough or so much work is done."""
+        found, limit = list[Solved](), self.solves.counts.work + work
+        with suppress(Stopped):
+            while not (
+                stopping_rule.enough
+                or self.closest
+                or self.drawn_enough
+                or self.solves.counts.work >= limit
+                or stopping()
+                or self.is_least(best, task)
+            ):
+                # Where none has converged yet, they may all take long.
+                converged = stopping_rule.converged
+                with self.solves.at_most(MULTISTART.iterations if converged else self.solves.max_iterations):
+                    found.append(self.from_drawn(task, best if converged else None))
+                # One that is hardly better is the same optimum: that of the first start is as good.
+                if stopping_rule.add(task.optimum(found[-1])) or (not stopping_rule.converged and found[-1].violation < best.violation):
+                    best = found[-1]
+        return best, found
 
     def with_feasible_start(self, solved: Solved, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
-        """The result of a solve; if it is infeasible, the result of a solve from a feasible vector.
-
-        That vector is sought near the best that is known and near starts that are drawn, of which fewest and most are `tries`. If there is
-        none near any of them, the result is
-        what violates least, now and later: `closest`.
-        """
+        """The result of a solve or, if infeasible, of one from a feasible vector near the best known or drawn ones, whose fewest and most
+        numbers are `tries`; without any, what violates least, now and later: `closest`."""
         if self.closest is not None:
             return self.closest
         if solved.violation <= self.solves.tolerance or len(self._F) > self._given:
@@ -255,7 +254,7 @@ class MultistartSolver:
             start = self._starts.draw()[0] if known is None else known
             near, known = self.solves.least_violation(self.nlp, start), None
             if near.status == CONVERGED:
-                return self.better([solved, self.from_vector(near.z, task)], task)
+                return min(solved, self.from_vector(near.z, task), key=task.rank)
             tried.append(near)
         if sum(near.status == INFEASIBLE for near in tried) >= fewest:
             self.closest = min(tried, key=lambda near: near.violation)
@@ -270,34 +269,24 @@ class MultistartSolver:
         return solved
 
     def from_drawn(self, task: Scalarised, best: Solved | None = None) -> Solved:
-        """The result of a solve from a random start; `best` is the best result so far. If there is none and propagated states lead to no
-        optimum, the states of the guess are tried, too."""
+        """The result of a solve from a random start, with the states of the guess if propagated ones lead to no optimum and no `best` is
+        known."""
         found: list[Solved] = []
         for start in self._starts.draw(None if best is None else best.z):
             found.append(self.from_vector(start, task))
             if found[-1].status == CONVERGED or best is not None:
                 break
-        return self.better(found, task)
+        return min(found, key=task.rank)
 
     def merits(self, task: Scalarised, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
-        """Merits (k,) of points F (k, m) for a problem, to be minimised: alpha plus the excess over limits and constraints.
-
-        The excess over limits is in ranges of the objectives among the known points. With `strict`, as for results, a point with any excess
-        has an infinite merit; without, as for starts, it may still be good.
-        """
+        """Merits (k,) of points F (k, m), to be minimised: alpha plus the excess over constraints, and over limits in ranges of the known
+        points; if `strict`, as for results, any excess is infinite."""
         hard = task.hard
         ranges = np.ptp(self._F[:, hard], axis=0) if len(self._F) else np.ones(hard.sum())
         over = (np.maximum(F[:, hard] - task.reference[hard], 0.0) / np.where(ranges > 0, ranges, 1.0)).sum(axis=1)
         excess = over + np.where(violation <= self.solves.tolerance, 0.0, violation)
         merit = task.alpha(F) + (np.where(excess > MULTISTART.excess, np.inf, 0.0) if strict else excess)
         return np.where(np.isfinite(merit), merit, np.inf)
-
-    def better(self, found: list[Solved], task: Scalarised) -> Solved:
-        """The best of several results of one problem: converged ones first, by their alpha; then the others by their violation."""
-        F, violation = np.array([solved.F for solved in found]), np.array([solved.violation for solved in found])
-        failed = np.array([solved.status != CONVERGED for solved in found])
-        merit = np.where(failed, violation, self.merits(task, F, violation))
-        return found[np.lexsort((merit, failed))[0]]
 
     def nearest(self, task: Scalarised) -> np.ndarray | None:
         """The known vector (n,) with the best merit; None if none is known."""
@@ -311,22 +300,16 @@ class MultistartSolver:
         own = self.merits(task, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
         return self._known[np.argmin(merits)] if merits.min() < own - MULTISTART.clearly else None
 
-    def from_rival(self, rival: np.ndarray, solved: Solved, task: Scalarised) -> Solved:
-        """The better of a result and a solve from a better known vector (n,); if that solve moves far away, of one that stays near the
-        vector."""
-        found = self.better([solved, self.from_vector(rival, task)], task)
-        if self.rival(found, task) is not None:
-            found = self.better([found, self.from_vector(rival, task, near=True)], task)
-        return found
+    def from_rival(self, solved: Solved, task: Scalarised) -> Solved:
+        """The better of a result and a solve from a better known vector; if that moves far away, also of one that stays near the vector."""
+        for near in (False, True):
+            if (rival := self.rival(solved, task)) is not None:
+                solved = min(solved, self.from_vector(rival, task, near), key=task.rank)
+        return solved
 
     def is_least(self, solved: Solved, task: Scalarised) -> bool:
         """Whether a result converged and is the least that bounds allow, see `is_least` beside this class."""
         return solved.status == CONVERGED and is_least(self.nlp, solved.z, task)
-
-
-def alpha_of(task: Scalarised, solved: Solved) -> float | None:
-    """The alpha of a problem at a converged result."""
-    return float(task.alpha(solved.F)) if solved.status == CONVERGED else None
 
 
 def is_least(nlp: NLP, z: np.ndarray, task: Scalarised) -> bool:

@@ -218,15 +218,6 @@ def _front(points: Archive, span: np.ndarray) -> Archive:
     return points.take(distinct(points.F, span))
 
 
-@dataclass(frozen=True)
-class SurfaceTask:
-    """A planned gradient solve: the row of the point at which it starts, the reference (m,), and the target place (m,)."""
-
-    start: int
-    reference: np.ndarray
-    place: np.ndarray
-
-
 @dataclass
 class Surface:
     """Points on a surface, and the target places of solves. Distances are in the plane across the diagonal, in units of the front between
@@ -250,15 +241,13 @@ class Surface:
         """The points that are non-dominated and `distinct`."""
         return self.pool.take(distinct(self.pool.F, self.between))
 
-    def even(self) -> SurfaceTask:
-        """The task for the place that is farthest from all known places, from the best point for it."""
+    def even(self) -> tuple[int, np.ndarray]:
+        """The place (m,) that is farthest from all known places, and the row of the point that is best for it, at which a solve starts."""
         place = self.lattice[np.argmax(self._apart(self.lattice))]
-        reference = self.ideal + self.between * place
-        start = ((self.pool.F - reference) / self.between).max(axis=1).argmin()
-        return SurfaceTask(int(start), reference, place)
+        return int(((self.pool.F - self.ideal) / self.between - place).max(axis=1).argmin()), place
 
-    def guided(self, guide: Guide) -> SurfaceTask:
-        """The task for the place, around the guide's first point, that is farthest from known places, by the factors expected there. It
+    def guided(self, guide: Guide) -> tuple[int, np.ndarray]:
+        """The same for the place, around the guide's first point, that is farthest from known places, by the factors expected there. It
         starts at the nearest of the points where the guide wants most: the best point for the place alone may lie in a poor valley."""
         first = int(guide.anchors(self.pool.F)[0])
         shape = self.lattice - self.lattice.mean(axis=0)
@@ -268,14 +257,14 @@ class Surface:
         wanted = guide.factors(self.pool.F, self.pool.F)
         good = np.flatnonzero(wanted == wanted.max())
         start = good[np.linalg.norm(self.plane(self.pool.F[good]) - place, axis=1).argmin()]
-        return SurfaceTask(int(start), self.ideal + self.between * place, place)
+        return int(start), place
 
-    def add(self, task: SurfaceTask, found: Evaluation, feasible: bool) -> None:
-        """Add the result of a solve."""
-        self.known = np.vstack([self.known, task.place])
-        if feasible:
-            self.known = np.vstack([self.known, self.plane(found.F)])
-            self.pool = Archive.of(found, np.arange(1)).joined(self.pool)
+    def solve(self, solves: BudgetedSolves, start: int, place: np.ndarray) -> None:
+        """Add the result of a solve to a place."""
+        found = solves(self.pool.Z[[start]], (self.ideal + self.between * place)[None], self.between[None])
+        feasible = solves.feasible(found)
+        self.known = np.vstack([self.known, place, self.plane(found.F[feasible])])
+        self.pool = Archive.of(found, feasible).joined(self.pool)
         # What ran out of iterations is to go on.
         self.solved = np.vstack([self.solved, found.F[found.status == CONVERGED]])
 
@@ -291,10 +280,8 @@ class Surface:
 
 
 def cover(archive: Archive, ends: Archive, solves: BudgetedSolves, limit: int, guide: Guide | None) -> Surface:
-    """The points of an archive, with the ends of the front, and the results of solves to `limit` places between the ends.
-
-    With a guide, all solves that are left go to places that it wants.
-    """
+    """The points of an archive, with the ends of the front, and the results of solves to `limit` places between the ends; with a guide, of
+    all solves that are left, to places that it wants."""
     span = ranges(archive.F)
     pool = ends.joined(archive)
     ideal, between = ends.F.min(axis=0), np.ptp(ends.F, axis=0)
@@ -306,9 +293,7 @@ def cover(archive: Archive, ends: Archive, solves: BudgetedSolves, limit: int, g
         guided = guide is not None and np.ptp(guide.factors(surface.pool.F, surface.pool.F)) > 0.0
         if solves.left <= 0 or (k >= limit and not guided):
             break
-        task = surface.guided(guide) if guide is not None and guided else surface.even()
-        found = solves(surface.pool.Z[task.start : task.start + 1], task.reference[None], between[None])
-        surface.add(task, found, bool(solves.feasible(found)[0]))
+        surface.solve(solves, *(surface.guided(guide) if guide is not None and guided else surface.even()))
     return surface
 
 
@@ -343,10 +328,8 @@ class PolishLog:
 
 
 class BudgetedSolves:
-    """Gradient solves up to a number. After a request to end early no more are made.
-
-    `failed_pairs` (k, 2 m) has the objectives of points and of the neighbours from which nothing better was found for them.
-    """
+    """Gradient solves up to a number; after a request to end early no more are made. `failed_pairs` (k, 2 m) has the objectives of points
+    and of the neighbours from which nothing better was found for them."""
 
     def __init__(self, evaluator: Evaluator, left: int, log: PolishLog | None = None, failed_pairs: np.ndarray | None = None) -> None:
         self._evaluator, self._log = evaluator, log

@@ -71,6 +71,10 @@ class Scalarised:
         failed = solved.status != CONVERGED
         return failed, solved.violation if failed else self.loss(solved.F)
 
+    def optimum(self, solved: Solved) -> float | None:
+        """Alpha at a result; None if that did not converge."""
+        return float(self.alpha(solved.F)) if solved.status == CONVERGED else None
+
     def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
         """The result of gradient solves from a vector (n,), or near it only."""
         return solves(nlp, start, self, near)

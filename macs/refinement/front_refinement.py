@@ -74,11 +74,8 @@ def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float |
 
 
 class FrontRefinement:
-    """Refinement of the meshes of a front's points: first of its ends, then of the points between them, from the nearest on.
-
-    A point that is the best in an objective on its own mesh remains that. Points whose meshes are far too coarse begin on those of their
-    nearest neighbour.
-    """
+    """Refinement of the meshes of a front's points: first of its ends, then of the points between them, from the nearest on; all `first` on
+    one mesh, if it is given."""
 
     def __init__(
         self,
@@ -86,7 +83,7 @@ class FrontRefinement:
         wanted: Wanted,
         limit: int,
         chosen: Sequence[int] | None = None,
-        most_work: float | None = None,
+        most_work: float = np.inf,
         programs: Programs | None = None,
         enough: Callable[[OnMesh], bool] | None = None,
         max_iterations: int = MOST_ITERATIONS,
@@ -97,9 +94,9 @@ class FrontRefinement:
         self.good = np.flatnonzero(front.status == CONVERGED)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])), max_iterations)
-        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, True, enough, more)
+        self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, enough=enough, more=more)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
-        self._most_work, self._first = most_work, first
+        self._first = first
         self.found: dict[int, Refinement] = {}
         self._rows: dict[int, Points] = {}
 
@@ -203,12 +200,10 @@ class FrontRefinement:
         # Rough controls would need finer meshes than optimal ones.
         own = [] if known or near_meshes else [self.methods[i]]
         hints = list(dict.fromkeys([*near_meshes, *own]))
-        if self._most_work is not None:
-            # One point that resists is not to take what is meant for the others.
-            share = (FRONT.of_end if isinstance(task, LexicographicEnd) else FRONT.of_one) * self._most_work / len(self.chosen)
-            self.loop.most_work = min(self._most_work, self.loop.work + share)
-        self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
-        self.loop.most_work = self._most_work
+        # One point that resists is not to take what is meant for the others.
+        share = (FRONT.of_end if isinstance(task, LexicographicEnd) else FRONT.of_one) / len(self.chosen)
+        with self.loop.at_most(share * self.loop.most_work):
+            self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
         self._rows[i] = self._row(i, found.best, found.note)
 
     def _meshes_near(self, done: Sequence[int], error: float, task: Scalarised) -> list[Meshed]:

@@ -56,12 +56,8 @@ def mended(
     ends: Points | None = None,
     guide: Guide | None = None,
 ) -> Points:
-    """The front with its unverified points re-solved; see `Front.mended`.
-
-    With a `fine` mesh, since those of the points are known to be too coarse, all of them are solved on it first. Of `ends`, optima of
-    single objectives, those come in that are better in one than all of the points. Points that were not simulated are, for `verify`. A
-    guide says how densely points are wanted.
-    """
+    """The front with its unverified points re-solved, all on a `fine` mesh first, if that of the search is known to be too coarse; with
+    those of the `ends` that are better in an objective than all of the points. A guide says how densely points are wanted."""
     if not len(points):
         return verified(points, verify)
     with working(time_limit, progress) as (show, interrupts):
@@ -140,11 +136,36 @@ class _Mending:
         return Points.concatenate([points, ends[better]]).replace(stats=points.stats, solver=points.solver)
 
     def fill_gaps(self, points: Points, size: int, guide: Guide | None) -> Points:
-        """The points, filled up from verified ones if gradients can; see `fill_gaps`."""
-        if not differentiable(points.compiled()):
+        """The points with further verified ones, until there are `size` or the work is used up, and fewer unverified ones: by solves from
+        the nearest verified points, on their meshes, to where unverified ones are, then to the middles of the widest gaps."""
+        if not differentiable(self.programs.problem):
             return points
-        most = self._most_work(points, size - int(points.verified.sum()))
-        return fill_gaps(points, size, self._solves, np.inf if most is None else most, self.programs, self.simulations, guide)
+        most, tried = self._most_work(points, size - int(points.verified.sum())), np.empty((0, points.F.shape[1]))
+        while points.verified.any() and _needed(points).sum() < size and self._solves.counts.work < most and not stopping():
+            scales = objective_scales(points)
+            target = _target(points, tried, scales, guide)
+            if target is None:
+                break
+            tried = np.vstack([tried, target])
+            rows = np.flatnonzero(points.verified)
+            near = np.argsort(np.linalg.norm((points.simulated_F[rows] - target) / scales, axis=1), kind="stable")[: MENDING.starts]
+            found = (self._solved(points, int(row), Scalarised(target, scales, units=scales)) for row in rows[near])
+            if (new := next((one for one in found if one is not None), None)) is not None:
+                joined = Points.concatenate([points, new]).replace(stats=points.stats, solver=points.solver)
+                points = joined[best_rows(joined)]
+        return points[_within(points, size, guide)]
+
+    def _solved(self, points: Points, row: int, task: Scalarised) -> Points | None:
+        """A verified point of the task from a point, on its mesh; None if there is none."""
+        if not self._meshed(points, np.arange(len(points)) == row):
+            return None
+        nlp = self.programs(from_dict(points[row].transcription or {}))
+        solved = task.solve(self._solves, nlp, points[row].decision)
+        if solved.status != CONVERGED:
+            return None
+        found = from_vectors(nlp, solved.z[None], points.solver, points.stats)
+        found = verified(found, self.verify, task.weights, remark=False, simulations=self.simulations)
+        return found if found.verified[0] else None
 
     def _as_before(self, points: Points) -> Points:
         """The points, with the original in place of each that was verified originally and no longer is."""
@@ -182,11 +203,11 @@ class _Mending:
         # What refinement would wish for besides is no complaint about a point that is verified.
         return again.replace(notes=["" if i in job.found and again.verified[i] else note for i, note in enumerate(again.notes)])
 
-    def _most_work(self, points: Points, count: int, fine: Meshed | None = None) -> float | None:
-        """The work left for so many points, in iterations times variables; None (no limit) where there was no search, so that the mesh is
-        the only task."""
+    def _most_work(self, points: Points, count: int, fine: Meshed | None = None) -> float:
+        """The work left for so many points, in iterations times variables; no limit where there was no search, so that the mesh is the
+        only task."""
         if not points.stats["evaluations"]:
-            return None
+            return np.inf
         spent = points.stats.get("work", 0) - self._work + WORK.building * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places])) if fine is None else len(self.programs(fine).variables)
         return max(MENDING.share * self._work - spent, MENDING.each * count * size, MENDING.least)
@@ -221,39 +242,6 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: flo
     return Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats, solver=points.solver)
 
 
-def fill_gaps(
-    points: Points,
-    size: int,
-    solves: GradientSolves,
-    most_work: float,
-    programs: Programs,
-    simulations: Simulations,
-    guide: Guide | None = None,
-) -> Points:
-    """The points with further verified ones, until `size` of them are verified or the work is used up.
-
-    Solves lead first to where points are that are not verified, then to the middle of the widest gaps between verified ones. Each goes from
-    there to the front along the ranges of the objectives (Pascoletti and Serafini 1984) and starts at the nearest verified points, on their
-    meshes. As many of the points that are not verified are left out as the front has too many.
-    """
-    tried = np.empty((0, points.F.shape[1]))
-    while points.verified.any() and _needed(points).sum() < size and solves.counts.work < most_work and not stopping():
-        scales = objective_scales(points)
-        target = _target(points, tried, scales, guide)
-        if target is None:
-            break
-        tried = np.vstack([tried, target])
-        rows = np.flatnonzero(points.verified)
-        near = rows[np.argsort(np.linalg.norm((points.simulated_F[rows] - target) / scales, axis=1), kind="stable")][: MENDING.starts]
-        for row in near:
-            found = _solved(points, int(row), Scalarised(target, scales, units=scales), solves, programs, simulations)
-            if found is not None:
-                joined = Points.concatenate([points, found]).replace(stats=points.stats, solver=points.solver)
-                points = joined[best_rows(joined)]
-                break
-    return points[_within(points, size, guide)]
-
-
 def _within(points: Points, size: int, guide: Guide | None) -> np.ndarray:
     """Rows (k,) of a front with `size` points, if that is possible without the best of any objective: of verified points those that are
     well spread, of others as many as there is room for."""
@@ -286,20 +274,3 @@ def _target(points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide 
         widths *= guide.factors(good, middles)
     new = [k for k in np.argsort(-widths, kind="stable").tolist() if not (middles[k] == tried).all(axis=1).any()]
     return middles[new[0]] if new else None
-
-
-def _solved(
-    points: Points, row: int, task: Scalarised, solves: GradientSolves, programs: Programs, simulations: Simulations
-) -> Points | None:
-    """A verified point of the task from a point, on its mesh; None if there is none."""
-    point = points[row]
-    method = from_dict(point.transcription or {})
-    if not isinstance(method, Meshed):
-        return None
-    nlp = programs(method)
-    solved = task.solve(solves, nlp, point.decision)
-    if solved.status != CONVERGED:
-        return None
-    found = from_vectors(nlp, solved.z[None], points.solver, points.stats)
-    found = verified(found, simulations.tolerance, task.weights, remark=False, simulations=simulations)
-    return found if found.verified[0] else None

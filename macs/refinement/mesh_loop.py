@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -132,29 +133,41 @@ class Refinement:
         return "; ".join([*complaints, *([self.best.verdict.remark] if self.best.verdict.unstable else [])])
 
 
+@dataclass(eq=False)
 class MeshLoop:
     """Solves points on one mesh after another."""
 
-    def __init__(
-        self,
-        programs: Programs,
-        solves: GradientSolves,
-        wanted: Wanted,
-        limit: int,
-        most_work: float | None = None,
-        knots: bool = True,
-        enough: Callable[[OnMesh], bool] | None = None,
-        more: bool = True,
-    ) -> None:
-        self.programs, self.solves, self.wanted, self.limit, self.most_work = programs, solves, wanted, limit, most_work
-        self._knots, self._built, self._enough, self._more = knots, programs.built, enough, more
-        self.problem = programs.problem
+    programs: Programs
+    solves: GradientSolves
+    wanted: Wanted
+    limit: int  # most meshes of a point
+    most_work: float = np.inf  # iterations times variables
+    knots: bool = True  # whether edges of elements may move to where controls switch
+    enough: Callable[[OnMesh], bool] | None = None  # when a point is good, whatever else might be better
+    more: bool = True  # whether meshes get finer; otherwise elements move only
+
+    def __post_init__(self) -> None:
+        self.problem, self._built = self.programs.problem, self.programs.built
         self._differentiable, self._stated = differentiable(self.problem), stated_scales(self.problem.goals)
 
     @property
     def ended(self) -> bool:
         """Whether no further mesh may begin."""
-        return stopping() or (self.most_work is not None and self.work >= self.most_work)
+        return stopping() or self.left <= 0.0
+
+    @property
+    def left(self) -> float:
+        """The work that is left, in iterations times variables."""
+        return self.most_work - self.work
+
+    @contextmanager
+    def at_most(self, work: float) -> Iterator[None]:
+        """Context in which at most so much more work is done."""
+        usual, self.most_work = self.most_work, min(self.most_work, self.work + work)
+        try:
+            yield
+        finally:
+            self.most_work = usual
 
     @property
     def work(self) -> float:
@@ -195,7 +208,7 @@ class MeshLoop:
         least = _achieved(begun, task)
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
-            for proposal in self._proposals(present, waiting, self._knots and detours > 0):
+            for proposal in self._proposals(present, waiting, self.knots and detours > 0):
                 try:
                     reached, last = self._solved(proposal, present, task, others, least)
                 except Stopped:
@@ -215,12 +228,12 @@ class MeshLoop:
                 break
             least = min(least, _achieved(reached, task))
             present = reached
-            if self._enough is not None and self._enough(present):
+            if self.enough is not None and self.enough(present):
                 found.best = present
                 break
             found.best = min((found.best, present), key=lambda one: self._rank(one, task, least))
             history.append(self._rank(present, task, least)[1])
-            if self._enough is None and not self._rank(present, task, least)[0]:
+            if self.enough is None and not self._rank(present, task, least)[0]:
                 break
             if len(history) > LOOP.patience and min(history[-LOOP.patience :]) > LOOP.progress * min(history[: -LOOP.patience]):
                 found.trouble = TROUBLES[CONVERGED]
@@ -247,7 +260,7 @@ class MeshLoop:
         while waiting:
             hint = waiting.pop(0)
             yield Proposal(hint, better=hint != present.method)
-        if not self._more:
+        if not self.more:
             yield Proposal(redistributed(present.method, self.problem, present.trajectory))
             return
         knots = switched(present.method, self.problem, present.trajectory) if knotted else None

@@ -55,7 +55,7 @@ class MeshSearchLimits:
     ends: float = 1.0  # the same for the ends of a front, on the mesh of a search: points get meshes of their own
     meshes: int = 8  # most meshes of one optimum, beside the coarse one
     share: float = 0.5  # work of other starts on another mesh, and of refining what they find, as a part of that before
-    passable: float = 5.0  # times what is wanted that a point may miss where other meshes are tried only as long as that takes little
+    passable: float = 5.0  # error, in tolerances, with which other meshes are tried only as long as that takes little work
     hopeless: int = 2  # coarse meshes without anything feasible after which no other is tried
     infeasible: tuple[int, int] = (3, 3)  # fewest and most starts without a feasible vector on the first of these
     clearly: float = 1e-3  # part of its unit by which an objective on a coarse mesh differs that is another optimum
@@ -115,11 +115,10 @@ class MeshedOptimum:
     """An optimum, and the mesh that suits it."""
 
     method: Meshed  # the coarse mesh that it came from
-    coarse: NLP
-    solved: Solved  # on that; where no solve converged, the least infeasible result
+    nlp: NLP  # of its vector
+    solved: Solved  # on the coarse mesh; where no solve converged, the least infeasible result
     rule: MultistartStopping  # what starts there led to
     alpha: float = np.inf  # what the solve minimised, at its result
-    nlp: NLP | None = None  # of the mesh that suits it
     refinement: Refinement | None = None  # None where no solve on the coarse mesh converged
     unit: float = 1.0  # what of alpha counts as one
     loss: float = np.inf  # alpha on its best mesh
@@ -133,11 +132,6 @@ class MeshedOptimum:
         return self.solved.z if self.refinement is None else self.refinement.best.z
 
     @property
-    def program(self) -> NLP:
-        """That of its best mesh."""
-        return self.nlp or self.coarse
-
-    @property
     def status(self) -> str:
         """The status of the solves on its mesh: a refined result is an optimum."""
         return self.solved.status if self.refinement is None else CONVERGED
@@ -147,10 +141,16 @@ class MeshedOptimum:
         """Whether simulations confirm it to the wanted tolerance."""
         return self.refinement is not None and not self.refinement.complaints() and not self.behind
 
+    def rank(self, settled: float) -> tuple[bool, float]:
+        """Order: refined ones first, by their errors in tolerances, with a loss against others; then the rest by their violation."""
+        if self.refinement is None:
+            return True, self.solved.violation
+        return False, max(self.refinement.best.error, self.behind / settled)
+
     def certain(self, task: Scalarised) -> bool:
         """Whether no other start is expected to improve it: it is good, and all starts led to it, or the bounds allow no smaller value."""
         alike = self.hits == self.rule.converged > 1
-        return self.good and (alike or is_least(self.program, self.z, task))
+        return self.good and (alike or is_least(self.nlp, self.z, task))
 
     @property
     def optima(self) -> int:
@@ -188,8 +188,14 @@ class TaskOptima:
             self._units = units = np.minimum(self._units, loop.units(np.array([solved.F, *ends]), nlp, solved.z))
             task = replace(self.task, units=units) if self.end is None else LexicographicEnd.of(self.end, units, solved.F)
             with suppress(Stopped):
-                begun = loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True)
-                one = self._refined(one, loop.refine(begun, task), units)
+                found = loop.refine(loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True), task)
+                best, moving = found.best, self.task.moving
+                unit = float(np.max(self.task.weights[moving]) / np.max((self.task.weights / units)[moving]))
+                loss = self.task.loss(best.F)
+                known = [] if best.achieved is None else [self.task.loss(best.achieved) + best.doubt * unit]
+                known += [loss - found.worse * unit] if found.worse else []
+                achieved, own = min(known, default=np.inf), loop.programs(best.method)
+                one = replace(one, nlp=own, refinement=found, unit=unit, loss=loss, achieved=achieved)
         self.all.append(one)
 
     def promising(self, method: Meshed, nlp: NLP, solved: Solved) -> bool:
@@ -201,40 +207,13 @@ class TaskOptima:
         simulated = self.task.loss(simulated_objectives(self.loop.problem, verdict.simulation))
         return self.task.loss(solved.F) < best.loss and not simulated >= best.loss
 
-    def _refined(self, one: MeshedOptimum, refinement: Refinement, units: np.ndarray) -> MeshedOptimum:
-        best, task = refinement.best, self.task
-        unit = 1.0 / float(np.max((task.weights / units)[task.moving])) * float(np.max(task.weights[task.moving]))
-        loss = task.loss(best.F)
-        known = [] if best.achieved is None else [task.loss(best.achieved) + best.doubt * unit]
-        known += [loss - refinement.worse * unit] if refinement.worse else []
-        nlp, achieved = self.loop.programs(best.method), min(known, default=np.inf)
-        return replace(one, nlp=nlp, refinement=refinement, unit=unit, loss=loss, achieved=achieved)
-
     @property
     def best(self) -> MeshedOptimum:
         """The best by its errors; a loss against the value that another one achieved is one of the errors."""
         least, settled = min(one.achieved for one in self.all), self.loop.wanted.settled
         behind = [max((one.loss - least) / one.unit, 0.0) if np.isfinite(one.loss) and np.isfinite(least) else 0.0 for one in self.all]
         behind = [amount if amount > settled else 0.0 for amount in behind]
-        i = min(range(len(self.all)), key=lambda k: self._rank(self.all[k], behind[k] / settled))
-        return replace(self.all[i], behind=behind[i])
-
-    @staticmethod
-    def _rank(one: MeshedOptimum, behind: float) -> tuple[bool, float]:
-        """Order: refined ones first, by their errors, which include a loss against others; then the rest by their violation."""
-        return (True, one.solved.violation) if one.refinement is None else (False, max(one.refinement.best.error, behind))
-
-    @property
-    def passable(self) -> bool:
-        """Whether the best is nearly within tolerance relative to the spans of bounds, which may be much wider than the ranges of the
-        states."""
-        best = self.best
-        if best.refinement is None:
-            return False
-        point, wanted = best.refinement.best, self.loop.wanted
-        simulation, settled = point.verdict.simulation, max(point.verdict.off, point.change, best.behind) / wanted.settled
-        excess = max(simulation.violation, point.verdict.excess) / wanted.feasible
-        return max(simulation.max_defect / wanted.tolerance, excess, settled) <= SEARCH.passable and point.verdict.leaving <= wanted.leaving
+        return min((replace(one, behind=amount) for one, amount in zip(self.all, behind, strict=True)), key=lambda one: one.rank(settled))
 
 
 class MeshSearch:
@@ -252,7 +231,6 @@ class MeshSearch:
         self.loop, self.tasks = loop, [TaskOptima(loop, task, i if ends else None) for i, task in enumerate(tasks)]
         self._given, self._starts, self._rng, self._ends = given, starts, rng, ends
         self.solvers: dict[Meshed, MultistartSolver] = {}
-        self.coarse: dict[Meshed, list[Solved]] = {}  # the results of all tasks on a coarse mesh
         self._explored: list[set[Meshed]] = [set() for _ in tasks]
         self.exhausted, self._hopeless = False, 0
 
@@ -267,7 +245,7 @@ class MeshSearch:
                 if not self.tasks[-1].all:
                     raise
                 break
-            self.exhausted = self.loop.most_work is not None and self.loop.work >= self.loop.most_work
+            self.exhausted = self.loop.left <= 0.0
             if self._enough:
                 break
             if self._hopeless and FINEST in left:
@@ -291,9 +269,9 @@ class MeshSearch:
         best = [optima.best for optima in self.tasks]
         if any(one.refinement is None for one in best):
             return self._hopeless >= SEARCH.hopeless or self.loop.ended
-        passable = all(one.good or optima.passable for one, optima in zip(best, self.tasks, strict=True))
+        passable = self.loop.work >= WORK.little and all(one.rank(self.loop.wanted.settled)[1] <= SEARCH.passable for one in best)
         # The points of a front get meshes of their own in the end, and other starts on another mesh anyway.
-        return self._ends or all(one.good for one in best) or self.loop.ended or (passable and self.loop.work >= WORK.little)
+        return self._ends or all(one.good for one in best) or self.loop.ended or passable
 
     def _begin(self, method: Meshed) -> None:
         """Solve all tasks on a coarse mesh, from further starts if not yet done, and refine the best result; if that gives no good point,
@@ -307,18 +285,18 @@ class MeshSearch:
             solved = solver.solve(optima.task)
             if self._starts is None:
                 solved = solver.with_feasible_start(solved, optima.task, SEARCH.infeasible if not self._hopeless else MULTISTART.infeasible)
-            rule.add(self._loss(optima, solved))
+            rule.add(optima.task.optimum(solved))
             first.append(solved)
             rules.append(rule)
             if self._starts or self._explored[i] or solved.status != CONVERGED or solver.is_least(solved, optima.task):
                 return solved
             self._explored[i].add(method)
-            others = self._drawn(optima, solver, solved, rule, self.loop.work + WORK.little * (SEARCH.starts[0] if self._ends else 1.0))
-            return min([solved, *others], key=optima.task.rank)
+            work = WORK.little * (SEARCH.starts[0] if self._ends else 1.0)
+            return solver.drawn(solved, optima.task, rule, min(work, self.loop.left))[0]
 
-        self.coarse[method] = best = lexicographic_ends(solver, single) if self._ends else [single(0)]
+        best = lexicographic_ends(solver, single) if self._ends else [single(0)]
         self._hopeless += solver.closest is not None
-        if self._ends and self.loop.most_work is None:
+        if self._ends and np.isinf(self.loop.most_work):
             # Ends on the first mesh are sought however long that takes; refining them, and other meshes, are limited.
             self.loop.most_work = self.loop.work + len(self.tasks) * WORK.most
         for optima, one, other, rule in zip(self.tasks, first, best, rules, strict=True):
@@ -328,22 +306,6 @@ class MeshSearch:
             optima.add(method, nlp, other, rule, front)
             if other is not one and not self._ends and not optima.best.good and not self.loop.ended:
                 optima.add(method, nlp, one, rule)
-
-    @staticmethod
-    def _loss(optima: TaskOptima, solved: Solved) -> float | None:
-        return optima.task.loss(solved.F) if solved.status == CONVERGED else None
-
-    def _drawn(self, optima: TaskOptima, solver: MultistartSolver, known: Solved, rule: MultistartStopping, most: float) -> list[Solved]:
-        """Optima of random starts on a coarse mesh, one of which is known, until there are enough starts, or `most` work is done."""
-        found: list[Solved] = []
-        nearby = known if known.status == CONVERGED else None
-        with suppress(Stopped), self.loop.solves.at_most(MULTISTART.iterations):
-            while not (rule.enough or self.loop.ended or self.loop.work >= most):
-                solved = solver.from_drawn(optima.task, nearby)
-                loss = self._loss(optima, solved)
-                nearby = solved if rule.add(loss) else nearby
-                found += [solved] if loss is not None else []
-        return found
 
     def _elsewhere(self, i: int) -> None:
         """Solve from other starts on coarse meshes where not yet done, if that takes little work; refine results that are better than the
@@ -357,15 +319,13 @@ class MeshSearch:
             if method not in self._explored[i]:
                 with suppress(Stopped):
                     others += self._others(i, method, before + starts)
-        usual, most = loop.most_work, loop.work + budget
-        loop.most_work = most if usual is None else min(most, usual)
         rivals = [other.best.refinement for other in self.tasks if self._ends and other is not optima]
         front = [refinement.best.F for refinement in rivals if refinement is not None]
-        for _, method, solved, rule in sorted(others, key=lambda other: other[0])[: SEARCH.refined]:
-            nlp = self.solvers[method].nlp
-            if not loop.ended and (not self._ends or optima.promising(method, nlp, solved)):
-                optima.add(method, nlp, solved, rule, front)
-        loop.most_work = usual
+        with loop.at_most(budget):
+            for _, method, solved, rule in sorted(others, key=lambda other: other[0])[: SEARCH.refined]:
+                nlp = self.solvers[method].nlp
+                if not loop.ended and (not self._ends or optima.promising(method, nlp, solved)):
+                    optima.add(method, nlp, solved, rule, front)
 
     def _others(self, i: int, method: Meshed, most: float) -> list[tuple[float, Meshed, Solved, MultistartStopping]]:
         """Other optima on a coarse mesh that are worth refining, and their losses there against the best, in its units."""
@@ -381,16 +341,16 @@ class MeshSearch:
             solver = self.solvers.setdefault(method, MultistartSolver(nlp, None, 1, self._rng, loop.solves))
             with loop.solves.at_most(MULTISTART.iterations):
                 known = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), optima.task, self._ends)
-            rule.add(self._loss(optima, known))
+            rule.add(optima.task.optimum(known))
         least = optima.task.loss(known.F) if known.status == CONVERGED else np.inf
         # What is better by no more than the error of this mesh may be the same optimum.
         limit = least
         if self._ends and best.good:
             limit = min(least, best.loss) - (abs(least - best.loss) if np.isfinite(least) else 0.0)
         seen, found = [least], list[tuple[float, Meshed, Solved, MultistartStopping]]()
-        for solved in self._drawn(optima, solver, known, rule, most):
+        for solved in solver.drawn(known, optima.task, rule, min(most - loop.work, loop.left))[1]:
             loss = optima.task.loss(solved.F)
-            if all(abs(loss - other) > SEARCH.clearly * best.unit for other in seen):
+            if solved.status == CONVERGED and all(abs(loss - other) > SEARCH.clearly * best.unit for other in seen):
                 seen.append(loss)
                 if loss < limit or not (best.good or self._ends):
                     found.append(((loss - least) / best.unit, method, solved, rule))
@@ -404,8 +364,7 @@ class SearchMeshes:
     search: Transcription  # for the candidates of a search: cheap
     fine: Meshed | None  # a finer mesh, where one is needed for points that a simulation confirms
     counts: Counts  # what it cost to find out
-    ends: Points | None = None  # the ends of the front on the mesh of the search
-    refined: Points | None = None  # the same on meshes of their own
+    ends: Points | None = None  # the ends of the front, on meshes of their own
     rules: Mapping[int, MultistartStopping] = field(default_factory=dict)  # what starts found for each objective
 
 
@@ -417,11 +376,8 @@ def search_meshes(
     given: Callable[[NLP], np.ndarray | None] | None = None,
     starts: int | None = None,
 ) -> SearchMeshes:
-    """The problem's own default transcription, or DFET on a coarse mesh for a search, and on a mesh for all points of its front.
-
-    Without a default, each end of the front is sought on coarse meshes and then on finer ones, until a simulation agrees and a finer mesh
-    changes nothing. The fine mesh has the elements of all these.
-    """
+    """The problem's own default transcription; without one, those found from the ends of the front, which are sought on coarse meshes and
+    then on finer ones, until a simulation agrees and a finer mesh changes nothing."""
     problem = statement.compile()
     if isinstance(statement, Problem) and statement.default_transcription is not None:
         return SearchMeshes(stated(statement.default_transcription), None, Counts())
@@ -439,43 +395,24 @@ def search_meshes(
 
 def _chosen(search: MeshSearch, limits: float) -> SearchMeshes:
     """The coarse mesh of a search, that of the best ends, and the fine one, which has the elements of all meshes of these ends."""
-    loop, best = search.loop, [search.best(i) for i in range(len(search.tasks))]
-    counts, own = loop.solves.counts, [i for i, one in enumerate(best) if one.refinement is not None]
-    if not own:
-        return SearchMeshes(list(search.coarse)[-1], None, counts)
+    loop, methods, best = search.loop, list(search.solvers), [search.best(i) for i in range(len(search.tasks))]
+    refined = [(one, one.refinement.best) for one in best if one.refinement is not None]
+    if not refined:
+        return SearchMeshes(methods[-1], None, loop.solves.counts)
     # An end that came from another mesh than the first is hidden by that.
-    methods = list(search.solvers)
-    method = methods[max(methods.index(best[i].method) for i in own)]
-    solved = _ends_on(search, method, best)
-    converged = [i for i in own if solved[i].status == CONVERGED]
-    solver, stats = search.solvers[method], {"tolerance": loop.solves.tolerance}
-    Z = np.array([solved[i].z for i in converged]).reshape(-1, len(solver.nlp.variables))
-    ends = from_vectors(solver.nlp, Z, {}, stats, sort=False, **certified(solver.nlp, Z, None))
-    refinements = [one.refinement for one in best if one.refinement is not None]
-    rows = []
-    for one in (refinement.best for refinement in refinements):
-        nlp = loop.programs(one.method)
-        rows.append(from_vectors(nlp, one.z[None], {}, stats, trajectories=[one.trajectory], **certified(nlp, one.z[None], None)))
-    moved = [abs(best[i].loss - solved[i].F[i]) / best[i].unit for i in converged]
-    same = len(converged) == len(own) and verified(ends, limits).verified.all() and max(moved, default=0.0) <= limits
-    fine = method if same else _common([refinement.best.method for refinement in refinements], loop.problem)
-    rules = {i: best[i].rule for i in own}
-    return SearchMeshes(method, None if fine == method else fine, counts, ends, Points.concatenate(rows).replace(stats=stats), rules)
-
-
-def _ends_on(search: MeshSearch, method: Meshed, best: Sequence[MeshedOptimum]) -> list[Solved]:
-    """The ends of the front on a coarse mesh, from the best that are known."""
-    solver, solved = search.solvers[method], search.coarse.get(method, [])
-    if solved and all(one.refinement is None or one.solved is known for one, known in zip(best, solved, strict=True)):
-        return solved
-
-    def single(i: int) -> Solved:
-        one = best[i]
-        if one.method == method or one.refinement is None:
-            return one.solved
-        return solver.from_vector(solver.nlp.interpolate(one.refinement.best.trajectory), search.tasks[i].task)
-
-    return lexicographic_ends(solver, single)
+    method = methods[max(methods.index(one.method) for one, _ in refined)]
+    stats, rows = {"tolerance": loop.solves.tolerance}, []
+    for point in (point for _, point in refined):
+        nlp = loop.programs(point.method)
+        rows.append(from_vectors(nlp, point.z[None], {}, stats, trajectories=[point.trajectory], **certified(nlp, point.z[None], None)))
+    same = all(one.method == method and abs(one.loss - one.alpha) <= limits * one.unit for one, _ in refined)
+    if same:
+        Z = np.array([one.solved.z for one, _ in refined])
+        same = bool(verified(from_vectors(search.solvers[method].nlp, Z, {}, stats, sort=False), limits).verified.all())
+    fine = method if same else _common([point.method for _, point in refined], loop.problem)
+    rules = {i: one.rule for i, one in enumerate(best) if one.refinement is not None}
+    ends = Points.concatenate(rows).replace(stats=stats)
+    return SearchMeshes(method, None if fine == method else fine, loop.solves.counts, ends, rules)
 
 
 def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Meshed:

@@ -18,7 +18,7 @@ from transcription.stopping import stopping
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_between
-from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, alpha_of, guessed_start
+from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..gradients.scalarised import GradientSolves, Scalarised
 from ..pareto.archive import Archive
@@ -157,7 +157,7 @@ def restart_solves(
             task = (between if inner else singles)[which]
             start = Starts(evaluator.nlp, rng, MULTISTART.everywhere + turn + which).draw(solver.nearest(task))[0]
             found.append(solver.from_vector(start, task))
-            alpha, known = alpha_of(task, found[-1]), solver.merits(task, archive.F, archive.violation).min()
+            alpha, known = task.optimum(found[-1]), solver.merits(task, archive.F, archive.violation).min()
             worse |= alpha is not None and bool(
                 alpha > known + GRADIENT_RULES.other_optimum * (span / np.where(task.moving, task.weights, np.inf)).max()
             )

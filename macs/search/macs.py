@@ -229,7 +229,7 @@ class MACS(Settings, Solver):
             return refined[best_rows(refined)]
         if not self.remeshes or verify is None:
             return front.verify(verify)
-        fine, ends = (None, None) if chosen is None else (chosen.fine, chosen.refined)
+        fine, ends = (None, None) if chosen is None else (chosen.fine, chosen.ends)
         return Front.of(mended(front, verify, None, progress, fine, ends, guide))
 
     def check_objectives(self, m: int) -> None:

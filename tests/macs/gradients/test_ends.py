@@ -7,10 +7,12 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from macs import optimize, payoff
 from macs.gradients import ends
-from macs.gradients.ends import ENDS, lexicographic_ends
+from macs.gradients.ends import ENDS, lexicographic_ends, moved_along
 from macs.gradients.multistart import MultistartSolver
 from macs.gradients.scalarised import GradientSolves, Scalarised
 from problems import Problem
@@ -112,3 +114,21 @@ def test_what_is_least_stays_so_where_a_slack_would_gain_more_than_its_multiplie
     end = payoff(problem, mesh, starts=3, seed=1)[0]
     assert end.objectives["time"] == pytest.approx(quickest.objectives["time"], abs=1e-7 * 15.4)
     assert end.objectives["effort"] < quickest.objectives["effort"] - 0.1
+
+
+numbers, spans = st.floats(-100, 100), st.floats(1.0, 100)
+
+
+@given(a=numbers, b=numbers, before=st.tuples(spans, spans), after=st.tuples(spans, spans), share=st.floats(0, 1))
+def test_points_move_along_with_the_ends(a, b, before, after, share):
+    """Points on the line between two ends are on the line between these in their new places, at the same share of it."""
+    old = np.array([[a, b + before[1]], [a + before[0], b]])
+    new = np.array([[b, a + after[1]], [b + after[0], a]])
+    F = old[:1] + share * (old[1:] - old[:1])
+    references, weights = moved_along(F, old, new, np.array(before))
+    if np.abs((new - old) / before).max() > ENDS.moved:
+        assert references == pytest.approx(new[:1] + share * (new[1:] - new[:1]), abs=1e-9) and weights == pytest.approx(after)
+    else:
+        assert references is F and weights == pytest.approx(before)
+    for missing in ((F[:0], F[:0]), (old, np.full((2, 2), b))):
+        assert moved_along(F, *missing, np.ones(2))[0] is F, "without both ends, or where they are one"

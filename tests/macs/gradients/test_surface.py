@@ -62,10 +62,10 @@ def test_solves_begin_where_points_are_good_and_stay_in_the_better_valley() -> N
     poor = poor.take((poor.F > 0.0).all(axis=1))
     best = on_sphere(np.array([[0.3, 0.4, 0.5]]), GOOD)
     surface = Surface(ENDS.joined(poor).joined(best), np.zeros(3), np.ones(3), across(ENDS.F), ENDS.F)
-    task = surface.guided(GUIDE)
+    start, place = surface.guided(GUIDE)
     wanted = GUIDE.factors(surface.pool.F, surface.pool.F)
-    nearest = np.linalg.norm(surface.plane(surface.pool.F) - task.place, axis=1).argmin()
-    assert wanted[nearest] < wanted.max() == wanted[task.start]
+    nearest = np.linalg.norm(surface.plane(surface.pool.F) - place, axis=1).argmin()
+    assert wanted[nearest] < wanted.max() == wanted[start]
     solves = Spheres(40)
     few = on_sphere(simplex_lattice(3, 12), POOR)
     surface = cover(best.joined(few.take((few.F > 0.0).all(axis=1))), ENDS, solves, 12, GUIDE)  # type: ignore[arg-type]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from smooth_problems import bryson_denham
+from smooth_problems import bryson_denham, time_against_effort
 
 from macs import MACS, NSGA2, Front, payoff, sweep
-from macs.fronts import verified
 from macs.fronts.verified import unmarked
 from macs.gradients.front_polish import KEPT_INSIDE
 from macs.refinement import mending
 from problems import Problem, load
 from transcription import DFET, SingleShooting
+from transcription.stopping import stopped_by
 
 MESH = DFET(4, 6)
 LEAST = np.sqrt(2.0 * 10.0 * (1.0 / (4e-3 - 1.6e-3) + 1.0 / (4e-3 + 1.6e-3)))
@@ -151,13 +151,14 @@ def test_an_empty_front_stays_empty_and_keeps_its_reason(unverified, fine):
     assert len(nothing) == 0 and nothing.message == "no feasible point" and nothing.stats["verify"] == 1e-3
 
 
-@pytest.mark.slow
-def test_a_fine_mesh_is_for_all_points_and_each_is_simulated_once(monkeypatch):
-    """All verified already on the mesh of the search, and solved on the fine one all the same; nothing else is simulated."""
-    front = sweep(load("goddard"), DFET(8, 6), points=3, starts=1)
-    seen, simulate_all = [], verified.simulate_all
-    monkeypatch.setattr(verified, "simulate_all", lambda problem, some, **about: seen.extend(some) or simulate_all(problem, some, **about))
-    found = mending.mended(unmarked(front), 1e-3, fine=DFET(9, 7))
-    assert found.verified.all() and {one["settings"]["order"] for one in found.transcriptions} == {7}
-    assert len(seen) == len({id(one) for one in seen}) == 3
-    assert (np.abs(found.F - front.F) / np.ptp(front.F, axis=0)).max() < 0.01
+def test_a_fine_mesh_is_for_all_points():
+    """Simulations confirm all of them on the mesh of the search, where each effort is too large: the least in a time T is 12 / T^3."""
+    front = sweep(time_against_effort(), DFET(3, 2, control_order=0), points=5, starts=1)
+    assert front.verified.all() and len(front) == 5 and (front.F[:, 1] > 1.02 * 12.0 / front.F[:, 0] ** 3).all()
+    found = mending.mended(unmarked(front), 1e-3, fine=DFET(4, 3))
+    assert found.verified.all() and {one["settings"]["order"] for one in found.transcriptions} == {3}
+    assert found.F[:, 1] == pytest.approx(12.0 / found.F[:, 0] ** 3, rel=1e-7) and max(found.optimality) < 1e-6
+    assert found.F[[0, -1], 0] == pytest.approx([1.0, 2.0], abs=1e-7), "the ends of the front"
+    assert (np.abs(found.F - front.F) / np.ptp(front.F, axis=0)).max() < 0.15, "less than the distance of neighbours"
+    with stopped_by(lambda: True):
+        assert mending.mended(front, 1e-3, fine=DFET(4, 3)).trajectories == front.trajectories

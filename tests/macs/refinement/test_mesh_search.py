@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from smooth_problems import time_against_effort
 
 from macs import MACS, NSGA2, optimize, payoff
 from macs.gradients.scalarised import GradientSolves, Scalarised
@@ -21,19 +22,6 @@ from transcription import DFET, parse
 from transcription.base import NLP
 from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
-
-
-def smooth() -> Problem:
-    """A cart from rest to rest: time against effort, 12 / T^3."""
-    problem = Problem("cart")
-    move = problem.phase("move", t0=0.0, tf=(1.0, 2.0))
-    x, v = move.state("x", bounds=(-1, 2), initial=0, final=1), move.state("v", bounds=(-5, 5), initial=0, final=0)
-    u = move.control("u", bounds=(-20, 20))
-    move.dynamics(x=v, v=u)
-    problem.minimize("time", move.tf)
-    problem.minimize("effort", move.integral(u**2))
-    assert x is not None
-    return problem
 
 
 def layered(width: float) -> Problem:
@@ -50,12 +38,12 @@ def layered(width: float) -> Problem:
 
 def test_a_problem_has_its_own_default_or_a_coarse_mesh():
     assert default_transcription(load("goddard")) == parse("dfet:4x6")
-    assert default_transcription(smooth()) == default_transcription(smooth().compile()) == COARSE[0]
+    assert default_transcription(time_against_effort()) == default_transcription(time_against_effort().compile()) == COARSE[0]
 
 
 @pytest.mark.slow
 def test_a_smooth_problem_keeps_the_coarse_mesh():
-    found = search_meshes(smooth(), 1e-3, 1e-6)
+    found = search_meshes(time_against_effort(), 1e-3, 1e-6)
     assert found.search == COARSE[0] and found.fine is None and 2 <= found.counts.gradient_solves < 60
     assert found.ends is not None and len(found.ends) == 2
 
@@ -87,14 +75,14 @@ def test_a_search_begins_with_the_optima_of_single_objectives():
 @pytest.mark.slow
 def test_a_search_keeps_the_ends_that_were_found_for_its_mesh():
     """A few evaluations lead to few points. Least effort in a time T is 12 / T^3, least time 1."""
-    problem = smooth()
+    problem = time_against_effort()
     found = MACS(agents=4).solve(problem, evaluations=6, seed=1)
     assert found.verified.all() and found.objectives[0] == pytest.approx([1.0, 12.0], rel=1e-4)
     assert found.objectives[-1] == pytest.approx([2.0, 12 / 2**3], rel=1e-4)
 
 
 def test_what_peaks_forbid_is_searched_on_the_coarse_mesh():
-    problem = smooth()
+    problem = time_against_effort()
     problem.maximize("top speed", problem.phases["move"].peak(ca.fabs(problem.phases["move"]["v"])))
     assert search_meshes(problem, 1e-3, 1e-6).fine is None
 
@@ -134,7 +122,7 @@ def test_a_mesh_with_more_elements_than_a_search_is_to_have_is_thinned_evenly():
 @pytest.mark.slow
 @pytest.mark.parametrize("budget", [None, 300])
 def test_the_number_of_evaluations_has_a_default(budget):
-    problem = smooth()
+    problem = time_against_effort()
     problem.default_evaluations = 250
     front = NSGA2(population=10).solve(problem, evaluations=budget, seed=1)
     assert front.stats["evaluations"] == (budget or 250)
@@ -288,6 +276,14 @@ def test_work_ends_where_it_is_to_end():
     assert (
         loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.counts.work < 0.8 * free.solves.counts.work
     )
+
+
+def test_programs_that_a_search_has_are_not_made_again():
+    problem = time_against_effort().compile()
+    fine, searched, programs = DFET(4, 3), DFET(2, 3), Programs(problem)
+    assert programs(fine) is programs(fine) is not fine.nlp(problem) and programs.built == len(fine.nlp(problem).variables)
+    assert Programs(problem)(searched) is not searched.nlp(problem), "without a search nothing is kept for good"
+    assert programs(searched) is searched.nlp(problem) and programs.built == len(fine.nlp(problem).variables)
 
 
 @pytest.mark.slow
