@@ -15,7 +15,7 @@ from transcription.stopping import stopping
 from ..evaluation.evaluator import CONVERGED
 from ..pareto.directions import divisions_below, simplex_lattice
 from .multistart import MULTISTART, MultistartSolver
-from .scalarised import WORK, Scalarised
+from .scalarised import END, WORK, Scalarised
 
 METHODS = ("pascoletti-serafini", "epsilon")
 """Scalarisations of a sweep."""
@@ -29,9 +29,8 @@ class EndsLimits:
     # values, it was not determined by them, and a point where it is lower by more lies in another valley.
     loose: float = 1e-2
     slack: float = 1e-5  # part that may be lost where the others cannot be improved without any loss
-    soon: int = 50  # most iterations of a solve that is to improve the others without a loss
-    ties: int = 150  # the same with a loss
-    small: int = 600  # most variables of a program whose iterations take so little that `ties` are spent without slack, too
+    soon: int = 50  # most iterations of a first solve that is to improve the others without a loss, else `EndLimits.ties`
+    small: int = 600  # most variables of a program whose iterations take so little that `EndLimits.ties` are spent without slack, too
     unsure: float = 0.2  # part of what a slack is worth, as its multipliers say, that is not known
     rounds: int = 5  # most rounds in which optima are sought from each other
     gain: float = 1e-6  # what counts as a gain then, in scales
@@ -77,7 +76,7 @@ def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict
             if (i, k) in tried and (np.abs(optima[k].F - tried[i, k]) <= ENDS.loose * spans).all():
                 continue
             tried[i, k] = optima[k].F
-            with solver.solves.at_most(ENDS.ties):
+            with solver.solves.at_most(END.ties):
                 found = solver.from_vector(optima[k].z, Scalarised.single(i, m))
                 found = _gone_on(solver, found, optima[i].F[i] - ENDS.loose * spans[i], Scalarised.single(i, m))
             # What an end has lost to the others is none.
@@ -103,7 +102,7 @@ def _lexicographic(solver: MultistartSolver, i: int, optima: Sequence[Solved]) -
     if best.F[i] - least > MULTISTART.excess * max(spans[i], nlp_scales(solver.nlp)[i]):
         # What was lost for the others is worth a little of what they gained.
         near = np.where(np.arange(m) == i, np.inf, best.F + ENDS.slack * spans)
-        with solver.solves.at_most(ENDS.ties):
+        with solver.solves.at_most(END.ties):
             again = solver.from_vector(best.z, Scalarised.single(i, m, near))
         best = again if again.status == CONVERGED and again.F[i] < best.F[i] else best
     return best
@@ -117,7 +116,7 @@ def _tied(
     # Often there is only one such point: the feasible set has no interior then, and a solve takes long without improving anything.
     alone, large = Scalarised.single(j, len(spans), ceiling), ENDS.loose * abs(best.F[j] - optimum.F[j])
     small = len(best.z) <= ENDS.small
-    with solver.solves.at_most(ENDS.ties if small else ENDS.soon):
+    with solver.solves.at_most(END.ties if small else ENDS.soon):
         # No slack: where the front is steep, a small loss in one objective changes another by its square root.
         solved = solver.solve(alone, best.z)
         for _ in range(ENDS.rounds if small else 0):
@@ -130,7 +129,7 @@ def _tied(
     if optimum.status == CONVERGED and best.F[j] - solved.F[j] > large:
         # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
         # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.
-        with solver.solves.at_most(ENDS.ties):
+        with solver.solves.at_most(END.ties):
             other = solver.from_vector(optimum.z, replace(alone, ceiling=ceiling))
         if other.status == CONVERGED and solved.F[j] - other.F[j] > large:
             solved = other
@@ -143,7 +142,7 @@ def _tied_with_slack(
     """See `_tied`: solved with slack (m,) first, in fewer iterations, then without slack if the gain is larger than the slack explains."""
     m = len(slack)
     exactly, freer = Scalarised.single(j, m, ceiling), Scalarised.single(j, m, ceiling + slack)
-    with solver.solves.at_most(ENDS.ties):
+    with solver.solves.at_most(END.ties):
         near = solver.from_vector(best.z, freer, near=True)
         if near.status != CONVERGED:
             near = _gone_on(solver, solver.from_vector(best.z, freer), best.F[j] - large, freer)

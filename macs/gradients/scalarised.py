@@ -87,6 +87,7 @@ class EndLimits:
     room: float = 0.05  # how much worse other objectives may become, in units, before the end is also sought near where it was
     tied: float = 1e-6  # what counts as no loss of its own objective then, in units
     close: float = 1e-3  # violation up to which a start on another mesh is nearly the end itself
+    ties: int = 150  # most iterations of a solve that is to improve the others
 
 
 END = EndLimits()
@@ -140,7 +141,8 @@ class LexicographicEnd(Scalarised):
         # The first solve does not look at the other objectives, and often leaves a start that was nearly the end.
         (F,), (violation,) = nlp.evaluate(start[None])
         closer = violation <= END.close and bool((first.F >= F).all())
-        second = solves(nlp, start if closer else first.z, others, near)
+        with solves.at_most(END.ties):
+            second = solves(nlp, start if closer else first.z, others, near)
         # What tells whether the one objective is at its least are the multipliers for that alone.
         return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
 
@@ -155,7 +157,7 @@ class WorkLimits:
 
     building: float = 30.0  # iterations that take as long as it takes to make a program with its derivatives: measured 18 to 53
     little: float = 6e5  # what other starts may always take together: a second or two
-    most: float = 1.5e6  # after which no mesh of a single optimum is begun: some half a minute, more where programs are large
+    most: float = 1.5e6  # after which no mesh of an optimum is begun, once one is found: some half a minute, more for large programs
 
 
 WORK = WorkLimits()

@@ -232,7 +232,7 @@ class MeshSearch:
         self._given, self._starts, self._rng, self._ends = given, starts, rng, ends
         self.solvers: dict[Meshed, MultistartSolver] = {}
         self._explored: list[set[Meshed]] = [set() for _ in tasks]
-        self.exhausted, self._hopeless = False, 0
+        self.exhausted, self._hopeless, self._begun = False, 0, False
 
     def go(self, coarse: Sequence[Meshed]) -> None:
         """Solve on coarse meshes and refine the results, until all are good or another mesh does not pay; then solve from other starts."""
@@ -296,14 +296,17 @@ class MeshSearch:
 
         best = lexicographic_ends(solver, single) if self._ends else [single(0)]
         self._hopeless += solver.closest is not None
-        if self._ends and np.isinf(self.loop.most_work):
-            # Ends on the first mesh are sought however long that takes; refining them, and other meshes, are limited.
-            self.loop.most_work = self.loop.work + len(self.tasks) * WORK.most
+        if not self._begun and any(one.status == CONVERGED for one in best):
+            # What it took to find the first optima is not limited; refining them, and other meshes, are.
+            self.loop.most_work, self._begun = self.loop.most_work + self.loop.work, True
+        left = len(best)
         for optima, one, other, rule in zip(self.tasks, first, best, rules, strict=True):
+            left -= 1
             if optima.all and optima.best.good:
                 continue
             front = [end.F for end in best if self._ends and end is not other and end.status == CONVERGED]
-            optima.add(method, nlp, other, rule, front)
+            with self.loop.at_most(self.loop.left / (left + 1)):
+                optima.add(method, nlp, other, rule, front)
             if other is not one and not self._ends and not optima.best.good and not self.loop.ended:
                 optima.add(method, nlp, one, rule)
 
@@ -386,7 +389,7 @@ def search_meshes(
     show("ends of the front on coarse meshes")
     limits, m = SEARCH.ends * verify, len(problem.goals)
     wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
-    loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, knots=False)
+    loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, m * WORK.most, knots=False)
     tasks = [Scalarised.single(i, m) for i in range(m)]
     search = MeshSearch(loop, tasks, given or guessed_start, starts, np.random.default_rng(0), ends=True)
     search.go(coarse_meshes(statement))

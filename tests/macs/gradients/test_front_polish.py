@@ -7,11 +7,12 @@ import signal
 import numpy as np
 import pytest
 from fronts import distance_to_curve
+from smooth_problems import with_peak
 from synthetic_fronts import black_box
 
 from macs import NSGA2, Front
 from macs.evaluation.bilevel import Bilevel
-from problems import Problem, load
+from problems import load
 from problems.cases.goddard import reference
 from transcription import DFET, SingleShooting
 from transcription.stopping import stopping
@@ -62,11 +63,6 @@ def test_what_no_solve_came_to_stays_what_it_is(rough, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_same_bits_again(rough, smooth):
-    assert np.array_equal(rough.polished(FINE, solves=50).F, smooth.F)
-
-
-@pytest.mark.slow
 def test_it_begins_from_what_is_nearest_to_feasible_where_nothing_is(rough):
     lost = NSGA2(population=12).solve(load("goddard"), SingleShooting(40), evaluations=12, seed=1, inner="propagate")
     assert not len(lost) and lost.closest is not None
@@ -103,19 +99,25 @@ def test_an_interruption_leaves_what_was_found(rough, monkeypatch):
     assert any(point.transcription == FINE.to_dict() for point in found) and len(found) == len(rough)
 
 
-def test_what_makes_no_sense_is_refused(rough):
-    for wrong in ({"solves": -1}, {"solves": 2.5}, {"limit": 0}, {"limit": True}):
-        with pytest.raises(ValueError, match=next(iter(wrong))):
-            rough.polished(FINE, **wrong)
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"solves": -1}, "solves"),
+        ({"solves": 2.5}, "solves"),
+        ({"limit": 0}, "limit"),
+        ({"limit": True}, "limit"),
+        ({"verify": 0}, "verify"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(rough, wrong, words):
+    with pytest.raises(ValueError, match=words):
+        rough.polished(FINE, **wrong)
+
+
+def test_fronts_without_gradients_are_refused(rough):
     with pytest.raises(ValueError, match="Transcription such as DFET"):
         rough.polished("dfet:8x4")
     with pytest.raises(ValueError, match="black box"):
         black_box(3).polished(FINE)
-    problem = Problem("climb")
-    phase = problem.phase("up", t0=0.0, tf=1.0)
-    x, u = phase.state("x", bounds=(-2.0, 2.0), initial=0.0), phase.control("u", bounds=(-1.0, 1.0))
-    phase.dynamics(x=u)
-    problem.maximize("top", phase.peak(x))
-    problem.minimize("effort", phase.integral(u**2))
     with pytest.raises(ValueError, match="peak"):
-        NSGA2(population=4).solve(problem, SingleShooting(5), evaluations=8, inner="propagate", seed=1).polished(DFET(2, 2))
+        NSGA2(population=4).solve(with_peak("maximised"), SingleShooting(5), evaluations=8, inner="propagate", seed=1).polished(DFET(2, 2))

@@ -72,19 +72,6 @@ def test_points_that_cannot_be_made_feasible_are_marked():
     assert len(none) == len(feasible) == len(moved) == 0
 
 
-def test_margins_keep_rows_inside(rough):
-    nlp = COARSE.transcribe(bryson_denham())
-    evaluator = Bilevel(nlp, Propagate(), 1e-6)
-    start = nlp.interpolate(rough[4].trajectory)[None]
-    height = np.array(["height" in label for label in nlp.g_labels])
-    margins = np.where(height, 0.01, 0.0)[None]
-    plain, inside = (evaluator.descend(start, rough.F[4:5], np.ones((1, 2)), one) for one in (None, margins))
-    g = [np.array(nlp.functions(found.Z[0])[1]).ravel() for found in (plain, inside)]
-    assert g[0][height].max() == pytest.approx(0.0, abs=1e-6)
-    assert g[1][height].max() == pytest.approx(-0.01, abs=1e-6)
-    assert evaluator.counts.gradient_solves == 2
-
-
 def test_an_interruption_leaves_what_feasible(rough, monkeypatch):
     refine = Bilevel._descend
 
@@ -106,11 +93,6 @@ def test_the_message_of_a_front_without_feasible_points():
     empty = front.polished(DFET(2, 1), solves=2, verify=VERIFY)
     assert not len(empty) and empty.message == "no point violates less than 0.0001 when simulated"
     assert "0.0001" in empty.table() and len(front.polished(DFET(2, 1), solves=2, verify=1.0))
-
-
-def test_what_makes_no_sense_is_refused(rough):
-    with pytest.raises(ValueError, match="verify must be a positive number"):
-        rough.polished(COARSE, verify=0)
 
 
 class TestOfASearch:

@@ -24,19 +24,17 @@ from transcription import DFET
 from transcription.inner import Projection
 from transcription.stopping import stopped_by, stopping
 
-ANGLES = np.linspace(0.0, np.pi / 2, 20_001)
-CURVE = 1.0 - np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
-"""The front of `Circle`, which its solves search."""
-
 
 class Circle(Evaluator):
     """f = (1 - x cos(y), 1 - x sin(y)): the front is the quarter of a circle at x = 1, and a solve along the weights is exact."""
 
-    has_gradients = True
+    has_gradients, angles, places = True, 1, 20_001
 
     def __init__(self) -> None:
-        self.free, self.lower, self.upper = np.arange(2), np.zeros(2), np.array([1.0, np.pi / 2])
-        self.period, self.tolerance, self.counts = np.zeros(2), 1e-6, Counts()
+        size = 1 + self.angles
+        self.free, self.lower, self.upper = np.arange(size), np.zeros(size), np.array([1.0] + self.angles * [np.pi / 2])
+        self.period, self.tolerance, self.counts = np.zeros(size), 1e-6, Counts()
+        self.grid = on_front(self.angles, self.places)
 
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         return candidates.copy()
@@ -49,15 +47,31 @@ class Circle(Evaluator):
         return Evaluation(Z.copy(), self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), 0
 
     def _descend(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
-        rows = []
+        rows, F = [], self.objectives(self.grid)
         for reference, weight in zip(references, weights, strict=True):
-            moving = (weight > 0) & (reference < np.inf)
-            alpha = ((CURVE[:, moving] - reference[moving]) / weight[moving]).max(axis=1)
-            hard = ~moving & (reference < np.inf)
-            alpha[(CURVE[:, hard] > reference[hard] + 1e-12).any(axis=1)] = np.inf
-            rows.append([1.0, ANGLES[np.argmin(alpha)]])
+            moving, hard = (weight > 0) & (reference < np.inf), (weight == 0) & (reference < np.inf)
+            alpha = ((F[:, moving] - reference[moving]) / weight[moving]).max(axis=1)
+            alpha[(F[:, hard] > reference[hard] + 1e-9).any(axis=1)] = np.inf
+            rows.append(self.grid[np.argmin(alpha)])
         Z = np.array(rows)
         return Evaluation(Z, self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), len(Z)
+
+
+class Sphere(Circle):
+    """The same with three objectives: the front is the eighth of a sphere at x = 1."""
+
+    angles, places = 2, 101
+
+    @staticmethod
+    def objectives(Z: np.ndarray) -> np.ndarray:
+        x, a, b = Z.T
+        return 1.0 - x[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
+
+
+def on_front(angles: int, count: int) -> np.ndarray:
+    """Decisions (count**angles, 1 + angles) all over the front."""
+    axes = np.meshgrid(*angles * [np.linspace(0.0, np.pi / 2, count)], indexing="ij")
+    return np.column_stack([np.ones(count**angles), *(axis.ravel() for axis in axes)])
 
 
 def state_of(evaluator: Circle, Z: np.ndarray) -> SearchState:
@@ -117,43 +131,9 @@ def test_few_solves_are_not_spent_on_a_crowd() -> None:
     assert np.count_nonzero((angles < 0.65) | (angles > 0.85)) >= 6
 
 
-class Sphere(Circle):
-    """The same with three objectives: the front is the eighth of a sphere at x = 1."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.free, self.lower, self.upper = np.arange(3), np.zeros(3), np.array([1.0, np.pi / 2, np.pi / 2])
-        self.period = np.zeros(3)
-
-    @staticmethod
-    def objectives(Z: np.ndarray) -> np.ndarray:
-        x, a, b = Z.T
-        return 1.0 - x[:, None] * np.column_stack([np.cos(a) * np.cos(b), np.cos(a) * np.sin(b), np.sin(a)])
-
-    def _descend(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
-        rows = []
-        for reference, weight in zip(references, weights, strict=True):
-            moving, hard = (weight > 0) & (reference < np.inf), (weight == 0) & (reference < np.inf)
-            alpha = ((SURFACE[:, moving] - reference[moving]) / weight[moving]).max(axis=1)
-            alpha[(SURFACE[:, hard] > reference[hard] + 1e-9).any(axis=1)] = np.inf
-            rows.append(GRID[np.argmin(alpha)])
-        Z = np.array(rows)
-        return Evaluation(Z, self.objectives(Z), np.zeros(len(Z)), np.full(len(Z), CONVERGED)), len(Z)
-
-
-def on_sphere(count: int) -> np.ndarray:
-    """Decisions (count**2, 3) all over the front of `Sphere`."""
-    angles = np.linspace(0.0, np.pi / 2, count)
-    return np.array([[1.0, a, b] for a in angles for b in angles])
-
-
-GRID = on_sphere(101)
-SURFACE = Sphere.objectives(GRID)
-
-
 def uncovered(F: np.ndarray, sphere: Sphere) -> float:
     """How far a point of the sphere may be from the nearest of F."""
-    every = sphere.objectives(on_sphere(21))
+    every = sphere.objectives(on_front(2, 21))
     return float(np.linalg.norm(every[:, None] - F, axis=2).min(axis=1).max())
 
 
@@ -172,7 +152,7 @@ def test_a_surface_is_covered_by_few_solves_from_a_crowd() -> None:
 def test_solves_of_a_guided_surface_go_where_points_are_wanted(hoped) -> None:
     rng, sphere, goals = np.random.default_rng(3), AskingSphere(), tuple(Objective(name) for name in ("f1", "f2", "f3"))
     wanted = ReferencePoint({goal.name: value for goal, value in zip(goals, hoped, strict=True)})
-    region = Region.of(wanted, goals, SURFACE)
+    region = Region.of(wanted, goals, sphere.objectives(sphere.grid))
     state = state_of(sphere, np.column_stack([rng.uniform(0.85, 0.9, 20), rng.uniform(0.1, 1.4, (20, 2))]))
     archive = polish(state.archive, BudgetedSolves(sphere, 40), 20, guide=PreferenceGuide(wanted, goals))
     assert len(sphere.found) == 40 and region.contains(np.array(sphere.found[6:])).mean() > 0.5, "all but those of the ends"
@@ -293,14 +273,6 @@ def test_every_point_is_a_certified_optimum_of_the_mesh(name, mesh, reference, e
     assert distance_to_curve(front.objectives, reference()).max() < worst
     assert inverted_distance(front.objectives, reference()) < 0.044
     assert front.stats["evaluations"] <= evaluations and 0 < front.stats["gradient_solves"] <= evaluations // 20
-
-
-@pytest.mark.slow
-def test_without_refinement_nothing_is_certified_and_no_gradient_used() -> None:
-    front = MACS(refine=False).solve(load("goddard"), DFET(4, 6), evaluations=200, seed=1)
-    assert front.stats["gradient_solves"] == 0 and all(point.optimality is None for point in front)
-    box = MACS().minimize(lambda X: np.column_stack([X[:, 0], 1 - X[:, 0]]), [(0, 1), (0, 1)], evaluations=100, seed=1)
-    assert box.stats["gradient_solves"] == 0
 
 
 @pytest.mark.parametrize("kind", [AskingCircle, AskingSphere])

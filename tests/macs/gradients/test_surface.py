@@ -48,14 +48,6 @@ ENDS = on_sphere(np.eye(3), GOOD)
 """The ends of the front; they are no good for the preference."""
 
 
-def test_places_are_spread_evenly_without_a_guide() -> None:
-    surface = cover(on_sphere(np.eye(3), GOOD), ENDS, Spheres(40), 12, None)  # type: ignore[arg-type]
-    assert len(surface.points()) == 15
-    apart = np.linalg.norm(surface.points().F[:, None] - surface.points().F, axis=2) + 9 * np.eye(15)
-    assert apart.min() > 0.2
-    assert len(surface.solved) == 15
-
-
 def test_solves_begin_where_points_are_good_and_stay_in_the_better_valley() -> None:
     """One point of the good valley is best; those of the poor one are nearer to most places."""
     poor = on_sphere(simplex_lattice(3, 30), POOR)
