@@ -163,7 +163,7 @@ def payoff(
     job = _Job("payoff", problem, transcription, terms)
 
     def work() -> Front:
-        ends = job.ends()
+        ends = lexicographic_ends(job.solver)
         front = job.front(ends, job.ranges(ends), sort=False)
         return front if job.solver.closest is None else front.replace(message=f"nothing feasible was found; {conflict(job.nlp, front[0])}")
 
@@ -356,17 +356,13 @@ class _Job:
     def swept(self, points: int, method: str) -> Front:
         """The front of a sweep; its ends alone if one of them was not found."""
         for _ in range(ENDS.from_rivals):
-            ends = self.ends()
+            ends = lexicographic_ends(self.solver)
             if any(end.status != CONVERGED for end in ends):
                 return self.sifted(ends)
             found = solve_tasks(self.solver, tasks_between(np.array([end.F for end in ends]), self.ranges(ends), points, method))
             if not self.surpassed(ends, found):
                 break
         return self.sifted([*ends, *found], self.ranges(ends))
-
-    def ends(self) -> list[Solved]:
-        """The lexicographic optimum of each objective."""
-        return lexicographic_ends(self.solver)
 
     def ranges(self, ends: Sequence[Solved]) -> np.ndarray:
         """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -48,22 +49,18 @@ TROUBLES = {"": "its mesh cannot be refined further", CONVERGED: "finer meshes d
 
 
 class Programs:
-    """Cache of the latest NLPs of a problem on meshes, which take some ten megabytes each. NLPs that the problem keeps anyway, from a
-    search, are reused."""
+    """Cache of the latest NLPs of a problem on meshes, which take some ten megabytes each; those that a search keeps anyway are reused."""
 
     def __init__(self, problem: CompiledProblem, kept: int = LOOP.kept) -> None:
-        self.problem, self.built, self._most = problem, 0, kept
-        self._kept: dict[Transcription, NLP] = {}
+        self.problem, self.built, self._made = problem, 0, lru_cache(kept)(self._make)
 
     def __call__(self, method: Transcription) -> NLP:
         """The NLP of the problem on these meshes."""
-        nlp = self._kept.pop(method, None) or kept_nlp(self.problem, method)
-        if nlp is None:
-            nlp = method.transcribe(self.problem)
-            self.built += len(nlp.variables)
-        self._kept[method] = nlp
-        while len(self._kept) > self._most:
-            del self._kept[next(iter(self._kept))]
+        return kept_nlp(self.problem, method) or self._made(method)
+
+    def _make(self, method: Transcription) -> NLP:
+        nlp = method.transcribe(self.problem)
+        self.built += len(nlp.variables)
         return nlp
 
 

@@ -189,9 +189,7 @@ class TaskOptima:
             task = replace(self.task, units=units) if self.end is None else LexicographicEnd.of(self.end, units, solved.F)
             with suppress(Stopped):
                 found = loop.refine(loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True), task)
-                best, moving = found.best, self.task.moving
-                unit = float(np.max(self.task.weights[moving]) / np.max((self.task.weights / units)[moving]))
-                loss = self.task.loss(best.F)
+                best, loss, unit = found.best, self.task.loss(found.best.F), float(units[self.task.moving][0])
                 known = [] if best.achieved is None else [self.task.loss(best.achieved) + best.doubt * unit]
                 known += [loss - found.worse * unit] if found.worse else []
                 achieved, own = min(known, default=np.inf), loop.programs(best.method)

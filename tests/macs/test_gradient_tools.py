@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from compiled_cases import compiled
+from fronts import distance_to_curve
 from smooth_problems import compass, corners, shuttle, slide, still, two_wells, with_peak
 
 from macs import Front, optimize, payoff, sweep
@@ -20,16 +21,9 @@ from problems.cases.orbit_rise import reference as orbit_reference
 from transcription import DFET
 
 MESH = DFET(4, 2)
+WRONG = ({"starts": 0}, {"starts": 1.5}, {"seed": -1}, {"tolerance": 0}, {"start": "nonsense"}, {"start": np.zeros((1, 7))})
+FEW = (1, 0, 2.5, True)
 TOOLS = (optimize, payoff, lambda *args, **more: sweep(*args, **{"points": 5, **more}))
-
-
-def distances(front: Front, truth: np.ndarray) -> np.ndarray:
-    """Distances (n,) of points from the curve through a dense front, objectives in its ranges."""
-    low, span = truth.min(axis=0), np.ptp(truth, axis=0)
-    points, curve = (front.objectives - low) / span, (truth - low) / span
-    start, step = curve[:-1], np.diff(curve, axis=0)
-    share = np.clip(((points[:, None] - start) * step).sum(axis=2) / (step**2).sum(axis=1), 0, 1)
-    return np.linalg.norm(start + share[..., None] * step - points[:, None], axis=2).min(axis=1)
 
 
 def certificates(front: Front) -> np.ndarray:
@@ -48,7 +42,7 @@ def goddard(method: str = "pascoletti-serafini") -> Front:
 def test_goddard_is_exact_but_where_the_mesh_is_not() -> None:
     front = goddard()
     assert len(front) == 10 and set(front.status) == {"converged"} and not front.message
-    miss = distances(front, goddard_reference(8001))
+    miss = distance_to_curve(front.objectives, goddard_reference(8001))
     late = front.objectives[:, 0] > 112
     assert np.count_nonzero(late) >= 9 and miss[late].max() < 1e-6 and miss.max() < 3e-4
     assert certificates(front).max() < 1e-6 and front.violation.max() <= 1e-6
@@ -73,7 +67,7 @@ def test_both_methods_lie_on_one_curve() -> None:
     assert np.diff(speeds) == pytest.approx(np.full(9, np.ptp(speeds) / 9), abs=1e-6)
     for front in (one, other):
         late = front.objectives[:, 0] > 112
-        assert distances(front[late], goddard_reference(8001)).max() < 1e-6
+        assert distance_to_curve(front[late].objectives, goddard_reference(8001)).max() < 1e-6
 
 
 @pytest.mark.slow
@@ -81,7 +75,7 @@ def test_both_methods_lie_on_one_curve() -> None:
 def test_orbit_rise_is_what_its_mesh_can_be(name: str) -> None:
     front = sweep(load(name), DFET(30, 1), points=10, starts=1)
     assert len(front) == 10 and certificates(front).max() < 1e-6
-    miss = distances(front, orbit_reference())
+    miss = distance_to_curve(front.objectives, orbit_reference())
     assert miss.mean() < 5e-5 and miss.max() < 1e-4
 
 
@@ -211,37 +205,21 @@ def test_objectives_that_are_in_no_conflict_have_one_point() -> None:
     assert len(front) == 1 and np.allclose(front.F, 0, atol=1e-9) and "dominated or equal" in front.message
 
 
-@pytest.mark.parametrize("tool", TOOLS)
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    ("call", "message"),
     [
-        ({"starts": 0}, "starts"),
-        ({"starts": 1.5}, "starts"),
-        ({"seed": -1}, "seed"),
-        ({"tolerance": 0}, "tolerance"),
-        ({"start": "nonsense"}, "start"),
-        ({"start": np.zeros((1, 7))}, "start"),
+        *((lambda tool=tool, wrong=wrong: tool(slide(), MESH, **wrong), next(iter(wrong))) for tool in TOOLS for wrong in WRONG),
+        (lambda: optimize(slide(), MESH, objective="range"), "no objective 'range'; there are effort, miss"),
+        (lambda: sweep(slide(), MESH, points=5, method="magic"), "unknown method 'magic'; there are pascoletti-serafini, epsilon"),
+        *((lambda points=points: sweep(slide(), MESH, points=points), "points must be a whole number of at least 2") for points in FEW),
+        (lambda: sweep(corners(), MESH, points=2), "points must be at least 3, one for each objective"),
+        (lambda: sweep(two_valleys(), MESH, points=5), "one objective has no front to sweep"),
+        (lambda: payoff("goddard", MESH), "problem must be a Problem, not str"),
     ],
 )
-def test_arguments_that_make_no_sense(tool, wrong: dict, message: str) -> None:
+def test_calls_that_make_no_sense(call, message) -> None:
     with pytest.raises(ValueError, match=message):
-        tool(slide(), MESH, **wrong)
-
-
-def test_calls_that_make_no_sense() -> None:
-    with pytest.raises(ValueError, match="no objective 'range'; there are effort, miss"):
-        optimize(slide(), MESH, objective="range")
-    with pytest.raises(ValueError, match="unknown method 'magic'; there are pascoletti-serafini, epsilon"):
-        sweep(slide(), MESH, points=5, method="magic")
-    for points in (1, 0, 2.5, True):
-        with pytest.raises(ValueError, match="points must be a whole number of at least 2"):
-            sweep(slide(), MESH, points=points)
-    with pytest.raises(ValueError, match="points must be at least 3, one for each objective"):
-        sweep(corners(), MESH, points=2)
-    with pytest.raises(ValueError, match="one objective has no front to sweep"):
-        sweep(two_valleys(), MESH, points=5)
-    with pytest.raises(ValueError, match="problem must be a Problem, not str"):
-        payoff("goddard", MESH)  # type: ignore[arg-type]
+        call()
 
 
 @pytest.mark.parametrize("tool", TOOLS)

@@ -68,14 +68,14 @@ def test_counts_of_starts(losses, noise):
 def test_starts_are_near_the_best_or_anywhere():
     nlp = DFET(6, 4).transcribe(load("goddard"))
     starts, best = Starts(nlp, np.random.default_rng(0)), nlp.first_guess(nlp.lower[nlp.free][None] + 0.5 * nlp.span[nlp.free])[0]
-    drawn = np.array([starts.draw(best)[0] for _ in range(MULTISTART.everywhere + 40)])
+    drawn = np.array([starts.draw(best)[0] for _ in range(MULTISTART.everywhere + 20)])
     free = (drawn - best)[:, nlp.free] / nlp.span[nlp.free]
     assert (drawn[:, nlp.free] >= nlp.lower[nlp.free]).all() and (drawn[:, nlp.free] <= nlp.upper[nlp.free]).all()
     deviation = np.sqrt((free**2).mean(axis=1))
     near, anywhere = deviation[MULTISTART.everywhere + 1 :: 2], deviation[MULTISTART.everywhere :: 2]
     assert np.median(near) < 0.5 * np.median(anywhere) and near.min() < 0.05
     again = Starts(nlp, np.random.default_rng(0))
-    assert np.array_equal([again.draw(best)[0] for _ in range(MULTISTART.everywhere + 40)], drawn)
+    assert np.array_equal([again.draw(best)[0] for _ in range(MULTISTART.everywhere + 20)], drawn)
 
 
 @pytest.mark.slow
@@ -131,7 +131,6 @@ def test_where_bounds_allow_no_less_no_other_start_is_made():
     assert pytest.approx(np.array([[1.0, -1.0], [5.0, -3.0]]), abs=1e-6) == front.F
     point = optimize(both, DFET(2, 2), objective="duration")
     assert point.alone().stats["starts"] == 1 and point.F[0] == pytest.approx(1.0, abs=1e-6)
-    assert optimize(both, DFET(2, 2), objective="reach").alone().stats["starts"] > 1
     alone = optimize(bounded(duration=lambda p, tf, x: 2 * tf - p))
     assert alone.alone().stats["starts"] == 1 and alone.F[0] == pytest.approx(1.0, abs=1e-6)
 

@@ -238,7 +238,7 @@ def searched(loop, coarse=COARSE, m=1):
     return search.best(0)
 
 
-def found_for(problem: Problem, wanted: Wanted, coarse=COARSE, most_work: float | None = None):
+def found_for(problem: Problem, wanted: Wanted, coarse=COARSE, most_work: float = np.inf):
     compiled = problem.compile()
     loop = MeshLoop(Programs(compiled), GradientSolves(1e-6), wanted, 8, most_work)
     return searched(loop, coarse, len(compiled.goals)), loop
