@@ -168,13 +168,15 @@ class GradientSolves:
 
     def __init__(self, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
         self.tolerance, self.max_iterations = tolerance, max_iterations
-        self.counts, self._persistent = Counts(), True
+        self.counts, self._persistent, self._most_work = Counts(), True, np.inf
         self.before: Callable[[], None] = lambda: None
 
     def __call__(self, nlp: NLP, start: np.ndarray, task: Scalarised, near: bool = False) -> Solved:
         """The result of one solve from a vector (n,), or near it only; see `scalarize`."""
         self.before()
-        limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": self.max_iterations, "persistent": self._persistent}
+        iterations = max(1, int(min(self.max_iterations, (self._most_work - self.counts.work) / len(nlp.variables))))
+        persistent = self._persistent and iterations == self.max_iterations
+        limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": iterations, "persistent": persistent}
         aim: dict[str, Any] = {"reference": task.reference, "weights": task.weights, "ceiling": task.ceiling}
         return self._counted(nlp, scalarize(nlp, start, **aim, near=near, **limits))
 
@@ -186,6 +188,15 @@ class GradientSolves:
     def _counted(self, nlp: NLP, solved: Solved) -> Solved:
         self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
         return solved
+
+    @contextmanager
+    def within(self, work: float) -> Iterator[None]:
+        """Context in which solves end when together they have taken so much work."""
+        self._most_work = self.counts.work + work
+        try:
+            yield
+        finally:
+            self._most_work = np.inf
 
     @contextmanager
     def at_most(self, iterations: int) -> Iterator[None]:
