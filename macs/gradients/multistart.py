@@ -23,6 +23,7 @@ from transcription.smooth import Smooth
 from transcription.stopping import Stopped, stopping
 
 from ..evaluation.evaluator import CONVERGED
+from ..pareto.archive import Archive
 from .scalarised import WORK, GradientSolves, Scalarised
 
 
@@ -178,11 +179,9 @@ class MultistartSolver:
         self.stopping, self.most, self._unseen = dict[int, MultistartStopping](), most, unseen
         self.closest: Solved | None = None  # what violates least, where nothing is feasible
         self._starts = Starts(nlp, rng)
-        self._known = np.empty((0, len(nlp.variables))) if given is None else given
-        self._given = len(self._known)
-        self._F, self._violation = np.empty((0, len(nlp.problem.goals))), np.empty(0)
-        if given is not None:
-            self._F, self._violation = nlp.evaluate(given)
+        Z = np.empty((0, len(nlp.variables))) if given is None else given
+        self._given = len(Z)
+        self._known = Archive(Z, *(nlp.evaluate(Z) if len(Z) else (np.empty((0, len(nlp.problem.goals))), np.empty(0))))
 
     @property
     def drawn_enough(self) -> bool:
@@ -209,7 +208,7 @@ class MultistartSolver:
         else:
             solved = self.solve(task)
         solved = self.from_rival(solved, task)
-        for start in self._known[: self._given] if solved.status != CONVERGED and not self.closest else ():
+        for start in self._known.Z[: self._given] if solved.status != CONVERGED and not self.closest else ():
             solved = min(solved, self.from_vector(start, task), key=task.rank)
         return solved
 
@@ -246,7 +245,7 @@ class MultistartSolver:
         numbers are `tries`; without any, what violates least, now and later: `closest`."""
         if self.closest is not None:
             return self.closest
-        if solved.violation <= self.solves.tolerance or len(self._F) > self._given:
+        if solved.violation <= self.solves.tolerance or len(self._known) > self._given:
             return solved
         tried, limit, known = list[Solved](), self.solves.counts.work + WORK.little, self.nearest(task)
         fewest, most = tries or MULTISTART.infeasible
@@ -264,8 +263,7 @@ class MultistartSolver:
         """The result of one solve from a vector (n,), or near it only; if it converged, later solves may begin at it."""
         solved = self.solves(self.nlp, start, task, near)
         if solved.status == CONVERGED:
-            self._known = np.vstack([self._known, solved.z])
-            self._F, self._violation = np.vstack([self._F, solved.F]), np.append(self._violation, solved.violation)
+            self._known = self._known.joined(Archive(solved.z[None], solved.F[None], np.array([solved.violation])))
         return solved
 
     def from_drawn(self, task: Scalarised, best: Solved | None = None) -> Solved:
@@ -282,7 +280,7 @@ class MultistartSolver:
         """Merits (k,) of points F (k, m), to be minimised: alpha plus the excess over constraints, and over limits in ranges of the known
         points; if `strict`, as for results, any excess is infinite."""
         hard = task.hard
-        ranges = np.ptp(self._F[:, hard], axis=0) if len(self._F) else np.ones(hard.sum())
+        ranges = np.ptp(self._known.F[:, hard], axis=0) if len(self._known) else np.ones(hard.sum())
         over = (np.maximum(F[:, hard] - task.reference[hard], 0.0) / np.where(ranges > 0, ranges, 1.0)).sum(axis=1)
         excess = over + np.where(violation <= self.solves.tolerance, 0.0, violation)
         merit = task.alpha(F) + (np.where(excess > MULTISTART.excess, np.inf, 0.0) if strict else excess)
@@ -290,15 +288,15 @@ class MultistartSolver:
 
     def nearest(self, task: Scalarised) -> np.ndarray | None:
         """The known vector (n,) with the best merit; None if none is known."""
-        return self._known[np.argmin(self.merits(task, self._F, self._violation))] if len(self._known) else None
+        return self._known.Z[np.argmin(self.merits(task, self._known.F, self._known.violation))] if len(self._known) else None
 
     def rival(self, solved: Solved, task: Scalarised) -> np.ndarray | None:
         """A known vector (n,) that is clearly better for a problem than its own result; None if there is none."""
         if not len(self._known):
             return None
-        merits = self.merits(task, self._F, self._violation, strict=True)
+        merits = self.merits(task, self._known.F, self._known.violation, strict=True)
         own = self.merits(task, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
-        return self._known[np.argmin(merits)] if merits.min() < own - MULTISTART.clearly else None
+        return self._known.Z[np.argmin(merits)] if merits.min() < own - MULTISTART.clearly else None
 
     def from_rival(self, solved: Solved, task: Scalarised) -> Solved:
         """The better of a result and a solve from a better known vector; if that moves far away, also of one that stays near the vector."""

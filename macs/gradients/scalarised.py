@@ -107,11 +107,6 @@ class LexicographicEnd(Scalarised):
         return cls(np.where(np.arange(len(units)) == i, 0.0, np.inf), units, None, units, known)
 
     @property
-    def objective(self) -> int:
-        """The number of the objective."""
-        return int(np.argmin(self.reference))
-
-    @property
     def used(self) -> np.ndarray:
         """See `Scalarised.used`."""
         return np.ones(len(self.weights), dtype=bool)

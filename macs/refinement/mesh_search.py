@@ -187,7 +187,7 @@ class TaskOptima:
             # Objectives that are large only where an attempt is poor are not to be judged by that.
             self._units = units = np.minimum(self._units, loop.units(np.array([solved.F, *ends]), nlp, solved.z))
             task = replace(self.task, units=units) if self.end is None else LexicographicEnd.of(self.end, units, solved.F)
-            with suppress(Stopped):
+            with suppress(Stopped), loop.solves.within(loop.left):
                 found = loop.refine(loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True), task)
                 best, loss, unit = found.best, self.task.loss(found.best.F), float(units[self.task.moving][0])
                 known = [] if best.achieved is None else [self.task.loss(best.achieved) + best.doubt * unit]
