@@ -1,4 +1,4 @@
-"""Tests."""
+"""Phases by DFET: periodic controls, links, durations, guesses, peaks and what a trajectory shows."""
 
 from __future__ import annotations
 

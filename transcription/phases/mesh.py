@@ -110,13 +110,6 @@ class PhaseMesh:
         knots = np.array(self.edges)[list(self._ends_of_arcs)]
         return np.array([np.interp(self.edges, knots, one) for one in np.eye(len(knots))[1:-1]]).reshape(-1, len(self.edges)).T
 
-    def moved(self, places: np.ndarray) -> PhaseMesh:
-        """The same mesh with its moving edges at other places (m,), relative to the phase: from there they can move as far again."""
-        if not self.moving:
-            return self
-        edges = np.array(self.edges) + self.shares @ (places - np.array(self.edges)[list(self.moving)])
-        return replace(self, edges=tuple(edges.tolist()))
-
     def with_elements(self, edges: Sequence[float], order: int, control_order: int | None) -> PhaseMesh:
         """Other elements, and degrees on them, with the same moving edges and arcs. Raises ValueError if these are not among `edges`."""
         j = np.searchsorted(edges, [self.edges[k] - SHORTEST_ELEMENT for k in self.moving])
@@ -125,14 +118,14 @@ class PhaseMesh:
         return PhaseMesh(tuple(edges), order, control_order, tuple(j.tolist()), self.constant)
 
     def found_in(self, edges: np.ndarray) -> PhaseMesh:
-        """This mesh with its moving edges where a trajectory has them, whose elements end at `edges` (N + 1,); else as it is."""
+        """This mesh with its moving edges where a trajectory has them, whose elements end at `edges` (N + 1,): from there they can move as
+        far again; else as it is."""
         if len(edges) != len(self.edges) or not self.moving or not edges[-1] > edges[0]:
             return self
-        places = (edges - edges[0]) / (edges[-1] - edges[0])
-        low, high = self.ranges().T
-        mesh = self.moved(np.clip(places[list(self.moving)], low, high))
+        places, own, moving = (edges - edges[0]) / (edges[-1] - edges[0]), np.array(self.edges), list(self.moving)
+        moved = own + self.shares @ (np.clip(places[moving], *self.ranges().T) - own[moving])
         # Beyond rounding, of times far from 0 too, it is another one.
-        return mesh if np.abs(places - mesh.edges).max() <= 1e-9 else self
+        return replace(self, edges=tuple(moved.tolist())) if np.abs(places - moved).max() <= 1e-9 else self
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data; what a mesh does not have is left out."""
