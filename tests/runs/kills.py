@@ -143,9 +143,9 @@ def _patiently(work: Callable[[], Any]) -> Any:
 
 
 def children(pid: int) -> list[int]:
-    """The processes that a process has started."""
+    """The processes that the threads of a process have started."""
     try:
-        return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+        return [int(word) for file in Path(f"/proc/{pid}/task").glob("*/children") for word in file.read_text().split()]
     except OSError:
         return []
 
