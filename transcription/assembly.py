@@ -23,7 +23,7 @@ from .phases.reduced import Reduced
 from .phases.rows import EndSlots, Parts, Rows
 from .phases.writer import PhaseWriter, along, filled
 from .stopping import check_stopping
-from .trajectories.trajectory import Trajectory
+from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 WriterFactory = Callable[[CompiledPhase, Layout, EndSlots], PhaseWriter]
 
@@ -97,6 +97,7 @@ class Assembly:
             interpolate=self.interpolate,
             widen=self.widened,
             measure=lambda: self._filled(function("quantities", **{f"q{i}": one for i, one in enumerate(quantities)})),
+            costates=partial(self.costates, rows),
             adjoint=partial(self.adjoint, rows),
             dense=sum(writer.dense for writer in self._declared),
             parts=None if points is None else Parts.of(z, points, ca.vertcat(*rows.expressions[:linear]), q, of_quantities),
@@ -198,6 +199,11 @@ class Assembly:
         phases = tuple(writer.unpack(extended) for writer in self._declared)
         slots = zip(self.problem.parameters, self.parameters, strict=True)
         return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
+
+    def costates(self, rows: Rows, z: np.ndarray, multipliers: np.ndarray) -> dict[str, PiecewisePolynomial]:
+        extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
+        found = {w.phase.name: w.costates(extended, multipliers[rows.dynamics[w.phase.name]]) for w in self._declared}
+        return {name: costates for name, costates in found.items() if costates is not None}
 
     def adjoint(
         self, rows: Rows, z: np.ndarray, of_rows: np.ndarray, of_bounds: np.ndarray, weights: Mapping[str, np.ndarray]

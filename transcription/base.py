@@ -20,7 +20,7 @@ from .numerics.batched import Batched
 from .phases.adjoint import Adjoint
 from .phases.reduced import Reduced
 from .phases.rows import Parts
-from .trajectories.trajectory import Trajectory
+from .trajectories.trajectory import PiecewisePolynomial, Trajectory
 
 CONVERGED, INFEASIBLE, FAILED, TIMEOUT = "converged", "infeasible", "failed", "timeout"
 """The statuses of candidates and solves: feasible within the tolerance (and optimal, where that is asked for), or the reason why not."""
@@ -168,6 +168,9 @@ class NLP(Deriving):
         and controls where this mesh has its own, within bounds. In general it satisfies the equations only as well as both meshes do.
     widen : callable
         NLP -> the same one with all variables free that have bounds; see `whole`.
+    costates : callable
+        A vector (n,) and multipliers (r,) of the rows -> phase: its costates, a `PiecewisePolynomial`; without the phases of methods whose
+        multipliers say nothing between their places.
     adjoint : callable
         A vector (n,), multipliers (r,) of the rows and (n,) of the bounds of variables, and what a unit of each integral counts, by phase
         -> phase: its costates, an `Adjoint`; by the adjoint equation where the method's multipliers say nothing between their places, or
@@ -206,6 +209,7 @@ class NLP(Deriving):
     unpack: Callable[[np.ndarray], Trajectory]
     interpolate: Callable[[Trajectory], np.ndarray]
     widen: Callable[[NLP], NLP]
+    costates: Callable[[np.ndarray, np.ndarray], dict[str, PiecewisePolynomial]]
     adjoint: Callable[..., dict[str, Adjoint]]
     measure: Callable[[], ca.Function]
     dense: int = 0

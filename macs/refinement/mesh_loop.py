@@ -15,8 +15,9 @@ from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
 from transcription.meshed import Meshed
 from transcription.meshes.errors import objective_variations
+from transcription.meshes.minimum import OptimumMultipliers
 from transcription.meshes.moving_edges import switched
-from transcription.meshes.refinement import next_method, redistributed
+from transcription.meshes.refinement import next_method, redistributed, where_controls_gain
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
 from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
@@ -37,6 +38,8 @@ class LoopLimits:
     progress: float = 0.5  # the error falls at least to this fraction where there is progress
     detours: int = 4  # other meshes that are tried for a point where solves fail
     blunt: float = 1e-3  # change, in units, that objectives may have which a solve determines only by the root of its accuracy
+    # Where no more than this part of what other controls would gain to first order is gained, that says nothing: as on singular arcs.
+    hollow: float = 0.1
     # If a point gets worse by more than this, in units of what an objective may be off, it is also sought near where it was: a solve on a
     # finer mesh may take moving edges away from the switches at which they lay.
     slip: float = 0.1
@@ -77,18 +80,27 @@ class OnMesh:
     achieved: np.ndarray | None  # (m,): The objectives of its simulation, all minimised, where that is feasible
     doubt: float = 0.0  # by how much, in units, these may be too low, since constraints are not satisfied exactly
     change: float = np.inf  # largest change of an objective that matters from the mesh before, in units; infinite where there was none
+    tried: bool = False  # whether elements were cut where other controls would gain, which changed next to nothing
+
+    @property
+    def gaining(self) -> bool:
+        """Whether other controls are known to gain more than the tolerance of an objective."""
+        return not self.tried and self.verdict.gain > self.verdict.wanted.settled
 
     @property
     def error(self) -> float:
         """The largest error, or change from the previous mesh, in units of the tolerance."""
         wanted = self.verdict.wanted
-        return max(self.verdict.error, self.change / wanted.settled if wanted.confirmed else 0.0)
+        unsettled = max(self.change, self.verdict.gain if self.gaining else 0.0) / wanted.settled
+        return max(self.verdict.error, unsettled if wanted.confirmed else 0.0)
 
     def complaints(self) -> list[str]:
         """Reasons why the point is not good enough; empty if it is."""
         found = self.verdict.complaints()
         if not self.verdict.wanted.confirmed:
             return found
+        if self.gaining:
+            found.append(f"other controls would gain {self.verdict.gain:.1e} of the front's range, to first order")
         if np.isinf(self.change):
             found.append("it was not solved on a finer mesh")
         elif not self.change <= self.verdict.wanted.settled:
@@ -185,9 +197,10 @@ class MeshLoop:
         trajectory: Trajectory,
         units: np.ndarray,
         by_gradients: bool,
+        optimum: OptimumMultipliers | None = None,
     ) -> OnMesh:
         """The assessment of a vector that was found on a mesh."""
-        verdict = judge(self.problem, trajectory, self.wanted, F, units)
+        verdict = judge(self.problem, trajectory, self.wanted, F, units, optimum if self.wanted.confirmed else None)
         achieved = simulated_objectives(self.problem, verdict.simulation)
         feasible = verdict.simulation.violation <= self.wanted.feasible and verdict.leaving <= max(
             self.wanted.feasible, self.wanted.leaving
@@ -260,6 +273,10 @@ class MeshLoop:
         if not self.more:
             yield Proposal(redistributed(present.method, self.problem, present.trajectory))
             return
+        if present.gaining and not present.verdict.complaints():
+            cut = where_controls_gain(present.method, present.verdict, present.trajectory)
+            if cut not in seen:
+                yield Proposal(cut)
         knots = switched(present.method, self.problem, present.trajectory) if knotted else None
         if knots is not None and knots not in seen:
             yield Proposal(knots, better=True)
@@ -278,10 +295,12 @@ class MeshLoop:
         if solved.status != CONVERGED:
             return None, solved.status
         z, F = solved.z, solved.F
-        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients)
+        optimum = None if solved.multipliers is None else OptimumMultipliers.of(nlp, z, solved.multipliers)
+        reached = self.on_mesh(method, z, F, nlp.unpack(z), task.units, by_gradients, optimum)
         # On the same mesh nothing can be seen of what that has wrong.
         change = np.inf if method == present.method else _change(present, F, task, self.wanted.settled)
-        return replace(reached, change=change), solved.status
+        tried = present.gaining and change <= LOOP.hollow * present.verdict.gain
+        return replace(reached, change=change, tried=tried), solved.status
 
     def _from_starts(self, nlp: NLP, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float) -> tuple[Solved, bool]:
         """The best result of solves from the present trajectory and, if that fails or gets worse, near it, then from

@@ -181,6 +181,22 @@ def next_intervals(
     return PhaseMesh(tuple(equidistributed(places, density, count).tolist()), old.order)
 
 
+def where_controls_gain(method: Method, verdict: Verdict, trajectory: Trajectory) -> Method:
+    """The method with elements cut where other controls would gain: at the jumps of these, else in the middle; no edge moves."""
+    finer = {}
+    most = max((float(gain.amounts.max()) for gain in verdict.gains.values()), default=0.0)
+    for name, gain in verdict.gains.items():
+        old = method.mesh_of(name).found_in(trajectory[name].state.edges)
+        worst_first = [int(j) for j in np.argsort(-gain.amounts, kind="stable") if gain.amounts[j] >= REFINEMENT.worst_share * most > 0]
+        # Elements that are integrated in several steps are judged by these.
+        if worst_first and len(gain.amounts) == old.elements:
+            # Switches that are found leave fewer.
+            limit = 2 * max(method.most_elements, 2 * method.elements)
+            edges = split(np.array(old.edges), {j: gain.places[j].tolist() or [0.0] for j in worst_first}, limit)
+            finer[name] = PhaseMesh(tuple(edges.tolist()), old.order, old.control_order)
+    return method.remeshed(finer)
+
+
 def _finer(method: Meshed, old: PhaseMesh, trajectory: PhaseTrajectory, errors: PhaseErrors, scores: ElementScores) -> PhaseMesh:
     """The next mesh of one phase."""
     most = max(method.most_elements, 2 * method.elements)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..trajectories.arcs import Arcs
 from ..trajectories.simulate import Simulation, simulate, simulate_elements
 from ..trajectories.trajectory import PhaseTrajectory, Trajectory
 from .errors import PhaseErrors, phase_errors, state_scales
+from .minimum import Gain, OptimumMultipliers, gains
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,13 @@ class Verdict:
     missed_by_elements: float  # the same for the simulation of each element by itself: the error of quadratures and of peaks between nodes
     growth: float  # how much errors grow along the trajectory, where that was worth finding out; else 1
     narrow: float  # the least that any state does, in spans of its bounds
+    # What controls could still gain in each phase, see `minimum`, in units of the objectives; empty where that is not known.
+    gains: Mapping[str, Gain] = field(default_factory=dict)
+
+    @property
+    def gain(self) -> float:
+        """The gain of other controls in all phases together."""
+        return sum(float(gain.amounts.sum()) for gain in self.gains.values())
 
     @property
     def doubt(self) -> float:
@@ -177,6 +186,7 @@ def judge(
     wanted: Wanted,
     F: np.ndarray,
     units: np.ndarray,
+    optimum: OptimumMultipliers | None = None,
 ) -> Verdict:
     """The assessment of a trajectory by an integrator that is far more exact than the tolerance; see `Verdict`. F, units (m,)."""
     # An objective whose unit is a small part of it has to be simulated more exactly.
@@ -207,6 +217,7 @@ def judge(
         missed_by_elements=_missed(problem, parts, F, units),
         growth=growth(problem, trajectory) if grows else 1.0,
         narrow=narrow,
+        gains={} if optimum is None else gains(problem, trajectory, optimum, whole.quantities, units),
     )
 
 

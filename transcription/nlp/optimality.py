@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,7 +14,7 @@ from scipy.optimize import nnls
 from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack, identity, vstack
 from scipy.sparse.linalg import SuperLU, splu
 
-from problems.compiled import CompiledProblem, remembered
+from problems.compiled import CompiledPhase, CompiledProblem, remembered
 
 from ..base import NLP
 from ..trajectories.costates import Costates, PhaseCostates
@@ -328,6 +328,32 @@ def _largest(good: Callable[[float], bool], ratio: float) -> float:
     return low
 
 
+def hamiltonian(
+    phase: CompiledPhase, costates: np.ndarray, weights: np.ndarray, x: np.ndarray, u: np.ndarray, t: np.ndarray, s: np.ndarray
+) -> np.ndarray:
+    """H (k,) at k places, from costates and states (k, nx), weights of the integrals (nq,), controls (k, nu), times (k,) and s (ns,)."""
+    inputs = x.T, u.T, t[None], s
+    rates, integrands = (np.array(function(*inputs)).reshape(-1, len(t)) for function in (phase.dynamics, phase.integrands))
+    return np.asarray(np.einsum("ki,ik->k", costates, rates) + weights @ integrands)
+
+
+def integral_weights(
+    problem: CompiledProblem,
+    quantities: Sequence[np.ndarray],
+    parameters: np.ndarray,
+    of_objectives: np.ndarray,
+    of_constraints: np.ndarray,
+) -> dict[str, np.ndarray]:
+    """The weight of each integral (nq,) in the sum of objectives and constraints, each times its multiplier; by phase. quantities: a column
+    q for each phase, as in `NLP.quantities`."""
+    slopes = _slopes(problem).call([*quantities, parameters, of_objectives, of_constraints])
+    found = {}
+    for phase, slope in zip(problem.phases, slopes, strict=True):
+        first = 2 + phase.initials.size1_out(0) + phase.finals.size1_out(0)
+        found[phase.name] = np.array(slope).ravel()[first : first + phase.integrands.size1_out(0)]
+    return found
+
+
 @remembered
 def _slopes(problem: CompiledProblem) -> ca.Function:
     """(q of each phase, parameters, multipliers of objectives and of constraints) -> gradient of their sum by each q."""
@@ -351,19 +377,13 @@ def costates(nlp: NLP, z: np.ndarray, found: Multipliers) -> Costates | None:
     parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
     quantities = [np.array(q).ravel() for q in nlp.quantities.call([z])]
     of_constraints = of_rows[len(of_rows) - len(problem.limits) :]
-    slopes = _slopes(problem).call([*quantities, parameters, of_objectives, of_constraints])
-    # What a unit of each integral counts.
-    weights = {
-        phase.name: np.array(slope).ravel()[2 + phase.initials.size1_out(0) + phase.finals.size1_out(0) :][: phase.integrands.size1_out(0)]
-        for phase, slope in zip(problem.phases, slopes, strict=True)
-    }
+    weights = integral_weights(problem, quantities, parameters, of_objectives, of_constraints)
     adjoints, phases = nlp.adjoint(z, of_rows, of_bounds, weights), {}
     for phase in problem.phases:
         name, flown, adjoint = phase.name, trajectory[phase.name], adjoints[phase.name]
         values = adjoint.costates(flown.time)
-        inputs = flown.states.T, flown.controls.T, flown.time[None], np.array([flown.t0, flown.tf, *parameters])
-        rates, integrands = (np.array(function(*inputs)).reshape(-1, len(flown.time)) for function in (phase.dynamics, phase.integrands))
-        H = np.einsum("ki,ik->k", values, rates) + weights[name] @ integrands
+        s = np.array([flown.t0, flown.tf, *parameters])
+        H = hamiltonian(phase, values, weights[name], flown.states, flown.controls, flown.time, s)
         if not (np.isfinite(values).all() and np.isfinite(H).all()):
             return None
         phases[name] = PhaseCostates(tuple(v.name for v in phase.states), values, H, adjoint.costates, adjoint.error)

@@ -33,6 +33,8 @@ class Simulation:
         Re-evaluated, by name, in the user's senses.
     trajectory : Trajectory
         The simulated one.
+    quantities : tuple of arrays
+        What objectives and constraints see of each phase.
 
     Examples
     --------
@@ -49,6 +51,7 @@ class Simulation:
     violations: Mapping[str, float]
     objectives: Mapping[str, float]
     trajectory: Trajectory
+    quantities: tuple[np.ndarray, ...]
 
     def __repr__(self) -> str:
         objectives = ", ".join(f"'{name}': {value:g}" for name, value in self.objectives.items())
@@ -157,6 +160,7 @@ def _simulation(
         violations=violations,
         objectives={goal.name: float(value) for goal, value in zip(problem.goals, objectives, strict=True)},
         trajectory=Trajectory(tuple(simulated[i].trajectory for i in range(len(problem.phases))), planned.parameters),
+        quantities=tuple(quantities),
     )
 
 
