@@ -16,7 +16,7 @@ from macs.io.interrupts import Stopped
 from ..report.page import PageHeader, digest
 from .contest import CONTESTS
 from .contract import Bench, Row, save
-from .growth import SCALE
+from .growth import GENERATION, SCALE
 from .inner import INNER, POPULATION
 from .parts import PARTS_BENCH
 from .peers import PEERS
@@ -27,6 +27,7 @@ from .study import STUDY
 BENCHES: dict[str, Bench] = {
     **CONTESTS,
     "front": FRONT,
+    "generation": GENERATION,
     "inner": INNER,
     "methods": METHODS,
     "parts": PARTS_BENCH,

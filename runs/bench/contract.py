@@ -36,6 +36,7 @@ ASKED = {
     "beyond": 0.05,  # largest share of its runs' time that a study takes beyond it
     "exponent": 1.1,  # largest one of what grows linearly: caches, and what is measured, make some hundredths of it
     "front": 1.3,  # times the time of the better other inner level, at most
+    "generation": 0.15,  # what noise may add to the median of exponents
     "MB": 1500.0,  # most memory of a process that solves a published problem
     "peers": 1.5,  # times YAPSS's time, at most
     "population": 4.0,  # times as fast as one by one, without a compiler; candidates a second would depend on the machine

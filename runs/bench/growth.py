@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from macs import MACS, Front
+from macs import MACS, NSGA3, Front
 from macs.fronts.builders import from_vectors
 from macs.fronts.files import from_bytes, to_bytes
 from macs.io.console import Steps
@@ -30,7 +30,7 @@ from transcription.nlp.derivatives import gradients, hessian
 
 from ..execution.processes import lines_apart
 from ..execution.task import peak_memory
-from .contract import ASKED, Bench, Effort, Row, Target, column
+from .contract import ASKED, Bench, Effort, Row, Target, column, compiling, rounds_of, short
 
 Work = Callable[[], object]
 
@@ -72,6 +72,21 @@ def masses(count: int) -> Problem:
     phase.dynamics(**{f"x{i}": v[i] for i in range(count)}, **{f"v{i}": pulls[i] + u[i] for i in range(count)})
     problem.minimize("effort", phase.integral(sum(one * one for one in u)))
     problem.maximize("way", phase.final(x[-1]))
+    return problem
+
+
+def limited(count: int) -> Problem:
+    """A ride of a point mass with so many path constraints."""
+    problem = Problem(f"ride with {count} limits")
+    leg = problem.phase("ride", t0=0.0, tf=(1.0, 5.0))
+    x = leg.state("x", bounds=(-10.0, 10.0), initial=0.0)
+    v = leg.state("v", bounds=(-10.0, 10.0), initial=0.0)
+    u = leg.control("u", bounds=(-1.0, 1.0))
+    leg.dynamics(x=v, v=u)
+    for i in range(count):
+        leg.path(f"limit {i}", v + 0.01 * i * x * x, upper=5.0)
+    problem.minimize("time", leg.tf)
+    problem.maximize("way", leg.final(x))
     return problem
 
 
@@ -180,8 +195,10 @@ class Series:
 
     name: str
     unit: str  # what is counted
-    prepare: Callable[[int], Any]  # a size -> the work
+    prepare: Callable[[int], Any]  # a size -> the work; of `generation`, a function of the number of generations that runs them
     sizes: tuple[int, ...]
+    order: str = ""  # of the paper, in which Np is the population, Nk the nodes, I the constraints and M the objectives
+    power: int = 1  # the largest power of the size in it, logarithms left out
 
 
 SIZES = {
@@ -317,6 +334,106 @@ SCALE = Bench(
         ("memory", "exponent", lambda row: row.spread("memory")),
     ),
     targets=scale_targets,
+)
+
+
+# A generation of NSGA-III
+
+
+def flights(build: Callable[[int], Problem], nodes: int | None, population: int | None, size: int) -> Callable[[int], object]:
+    """Runs on shooting; what is None is the size."""
+    count = population or size
+    method, scheme, problem = NSGA3(population=count, degree="sum"), parse(f"shooting:{nodes or size}"), build(size)
+    settings: dict[str, Any] = {"seed": 1, "inner": "propagate", "start": Smooth(), "verify": None, "progress": False}
+    return lambda generations: method.solve(problem, scheme, evaluations=count * generations, **settings)
+
+
+def selections(handling: str, population: int) -> Callable[[int], object]:
+    """Runs on a plain function of four objectives, which takes no time: what is left is the selection. About half of a population does not
+    meet its constraint in the beginning."""
+    method = NSGA3(population=population, handling=handling)
+    settings: dict[str, Any] = {"seed": 1, "constraints": lambda X: X.sum(axis=1, keepdims=True) - 0.5 * X.shape[1]}
+    return lambda generations: method.minimize(four_goals, [(0.0, 1.0)] * 8, evaluations=population * generations, **settings)
+
+
+def four_goals(X: np.ndarray) -> np.ndarray:
+    """Objectives (k, 4) of vectors (k, d) in the unit box: distances from four of its corners."""
+    return np.linalg.norm(X[:, None] - np.eye(X.shape[1])[:4], axis=2)
+
+
+def reentry(size: int) -> Problem:
+    """The same at every size."""
+    return load("reentry_case1")
+
+
+GENERATIONS = (
+    Series("re-entry, 200 nodes", "individuals", partial(flights, reentry, 200, None), (120, 240, 480), "Np Nk + M Np^2", 2),
+    Series("re-entry, 120 individuals", "nodes", partial(flights, reentry, None, 120), (100, 200, 400, 800), "Np Nk"),
+    Series("ride, 240 individuals, 50 nodes", "constraints", partial(flights, limited, 50, 240), (50, 100, 200, 400), "Np I"),
+    *(
+        Series(f"selection, {name}", "individuals", partial(selections, way), (120, 240, 480, 960), f"M Np^2 + Np log^{power} Np", 2)
+        for name, way, power in (("SF", "feasible-first", "(M-2)"), ("PF", "penalty", "(M-2)"), ("MOCH", "objective", "(M-1)"))
+    ),
+)
+
+
+def generation_rounds(case: Series, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
+    """Each round measures a generation at all sizes. No function is compiled: a compiler's time is not proportional to anything."""
+    with compiling("0"):
+        runs = {size: case.prepare(size) for size in case.sizes}
+
+    def measured(number: int) -> Iterable[Row]:
+        with compiling("0"):
+            taken = [generation(run) for run in runs.values()]
+        return [Row.once(case.name, case.unit, size=case.sizes[-1], seconds=taken[-1], exponent=exponent(case.sizes, taken))]
+
+    return measured
+
+
+def generation(run: Callable[[int], object]) -> float:
+    """CPU seconds of one generation: a ninth-generation run less one of the first alone, so that set-up is not in it; the quickest of three
+    each."""
+    first, more = (min(cpu_seconds(run, count) for _ in range(3)) for count in (1, 9))
+    return (more - first) / 8
+
+
+def generation_targets(rows: Sequence[Row]) -> list[Target]:
+    """No time grows faster than the paper's order says, by the median of its exponents and up to what noise makes."""
+    powers, made = {one.name: one.power for one in GENERATIONS}, []
+    for row in rows:
+        if row.case in powers:
+            measured, limit = row.of("exponent"), powers[row.case] + ASKED["generation"]
+            made.append(Target(row.case, f"a power of at most {limit:g}", short(measured), measured <= limit))
+    return made
+
+
+def symbols(rows: Sequence[Row]) -> list[str]:
+    """What the letters of the orders stand for."""
+    return [
+        "Np: individuals, Nk: nodes, I: constraints, M: objectives. The orders are limits for large sizes: here costs that do not grow,",
+        "and work on whole arrays, make the measured exponents smaller.",
+        "",
+    ]
+
+
+GENERATION = Bench(
+    title="generation",
+    about="GENERATION: CPU time of one generation of NSGA-III at increasing sizes, and the power of the size with which it grows: 1 for "
+    "a time that is proportional to it. Selection: of a plain function of M = 4 objectives, with constraints handled in three "
+    "ways. The orders are of R. Chai et al., Solving multiobjective constrained trajectory optimization problem by an extended "
+    "evolutionary algorithm, IEEE Transactions on Cybernetics 50(4), 2020, section IV-D",
+    full=Effort(GENERATIONS, rounds=5),
+    quick=Effort(tuple(replace(one, sizes=tuple(4 * size // 5 for size in one.sizes[:3])) for one in GENERATIONS), rounds=2),
+    prepare=generation_rounds,
+    columns=(
+        column("largest", "size", "size", form="g"),
+        column("seconds of a", "generation", "seconds"),
+        ("exponent", "measured", lambda row: row.spread("exponent")),
+        ("order", "of the paper", lambda row: next((one.order for one in GENERATIONS if one.name == row.case), "-")),
+        rounds_of("exponent"),
+    ),
+    targets=generation_targets,
+    notes=symbols,
 )
 
 

@@ -42,6 +42,7 @@ Ratios against the alternatives, measured side by side in one run, with their sp
 
 constrained MW1-14 and DTLZ with constraints: MACS against the other algorithms at equal evaluations, hypervolume
 front       whole fronts by MACS until it is done, by its other inner levels to the same quality, and by sweeps from one and ten starts
+generation  how the time of a generation of NSGA-III grows with individuals, nodes and constraints, beside the orders of its paper
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
 many        DTLZ with 5 and 8 objectives, likewise: distance from the front, hypervolume
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree

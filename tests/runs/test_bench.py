@@ -152,7 +152,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["studies"], ["studies", "study", "constrained, front, inner, many, methods, parts, peers, population"]),
+        (["studies"], ["studies", "study", "constrained, front, generation, inner, many, methods, parts, peers, population"]),
         (["iner"], ["'iner'", "did you mean inner?"]),
         (["inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
         (["inner", "--seeds", "2"], ["'inner' has none"]),
@@ -222,6 +222,8 @@ MET_AND_MISSED = [
     ("front", front_rows(1 / 1.2, 1.0), 0),
     ("front", front_rows(1 / 1.4, 1.0), 1),
     ("front", front_rows(1 / 1.4, 0.0), 0),
+    ("generation", [Row("re-entry, 120 individuals", "nodes", {"exponent": times(1.15)})], 0),
+    ("generation", [Row("re-entry, 120 individuals", "nodes", {"exponent": times(1.16)})], 1),
     ("inner", inner_rows(15.0, 0.07, 1.0), 0),
     ("inner", inner_rows(14.9, 0.07, 1.0), 1),
     ("inner", inner_rows(15.0, 0.071, 1.0), 1),
@@ -383,6 +385,11 @@ def test_every_series_does_its_work(one):
     assert one.prepare(TINY[one.unit])() is not None
 
 
+@pytest.mark.parametrize("one", growth.GENERATIONS, ids=lambda one: one.name)
+def test_each_series_of_generations_runs(one):
+    one.prepare(one.sizes[0])(2)
+
+
 def test_exponents_are_those_of_powers():
     sizes = np.array([10.0, 20.0, 40.0])
     assert growth.exponent(sizes, 3.0 * sizes**1.5) == pytest.approx(1.5)
@@ -402,6 +409,21 @@ def test_growth_in_a_process_of_its_own():
     one = next(one for one in growth.SERIES if one.name == "set-up, single shooting")
     (row,) = measured("scale", replace(one, sizes=(4, 8, 12)))
     assert np.isfinite(row.of("time")) and row.of("size") == 12 and len(row.values["seconds at 8"]) == 1
+
+
+def test_generations_grow_as_their_work_does(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(growth.time, "process_time", lambda: clock[0])
+
+    def prepare(size: int):
+        def run(generations: int) -> None:
+            clock[0] += 1.0 + 5e-6 * size * size * generations
+
+        return run
+
+    (row,) = measured("generation", growth.Series("quadratic", "things", prepare, (20, 40, 80), "Np^2", 2))
+    assert row.of("exponent") == pytest.approx(2.0) and row.of("seconds") == pytest.approx(5e-6 * 6400)
+    assert "section IV-D" in BENCHES["generation"].report([row])
 
 
 def test_parts_are_off_one_at_a_time():
