@@ -24,6 +24,23 @@ from transcription.meshes.verdict import Wanted
 from transcription.phases.mesh import PhaseMesh
 
 
+def pulses(edges: list[float]) -> tuple[Problem, float]:
+    """x' = u s(t), least final x, |u| <= 1, where s is a polynomial with these roots: u = -sign(s). The problem, and the optimum."""
+    problem, s = Problem("pulses"), np.polynomial.Polynomial.fromroots(edges) * 10.0 ** (len(edges) / 2)
+    run = problem.phase("run", t0=0, tf=1)
+    x, u = run.state("x", bounds=(-2, 2), initial=0), run.control("u", bounds=(-1, 1))
+    run.dynamics(x=u * sum(float(one) * run.time**k for k, one in enumerate(s.coef)))
+    problem.minimize("end", run.final(x))
+    return problem, -float(np.abs(np.diff(s.integ()(np.array([0.0, *edges, 1.0])))).sum())
+
+
+@pytest.mark.parametrize("edges", [[0.2, 0.24, 0.6, 0.65], [0.05, 0.09, 0.7, 0.75]])
+def test_controls_that_a_coarse_mesh_hides_are_found_by_the_minimum_principle(edges):
+    problem, best = pulses(edges)
+    found = optimize(problem, progress=False)
+    assert found.verified and found.objectives["end"] == pytest.approx(best, abs=1e-6)
+
+
 def layered(width: float) -> Problem:
     """A state that falls from 1 within `width` of a phase of length 1, and rises to 1 again as late, for little effort."""
     problem = Problem("layers")
