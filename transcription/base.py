@@ -94,8 +94,11 @@ class Transcription(ABC):
         for option in (*(() if word == cls.word else (word,)), *options):
             kinds = (name for name, words in cls.options.items() if (option in words if words else option.isdecimal()))
             name = next(kinds, None)
-            if name is None or name in settings:
-                raise ValueError(f"'{option}' is given twice or unknown; write it as {cls.examples}")
+            if name is None:
+                known = "; ".join(", ".join(words) for words in cls.options.values() if words)
+                raise ValueError(f"'{option}' is none of its words ({known}); write it as {cls.examples}")
+            if name in settings:
+                raise ValueError(f"'{option}': {name} is given twice; write it as {cls.examples}")
             settings[name] = option if cls.options[name] else int(option)
         return cls(**settings)
 
