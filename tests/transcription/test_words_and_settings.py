@@ -90,10 +90,10 @@ def swing(*mesh: object) -> DFET:
             (lambda text=text: parse(text), "write it as")
             for text in ("dfet:4", "dfet:4x6x7", "dfet:4x6:1:2", "radau:4", "radau", "shooting")
         ),
-        *(
-            (lambda text=text: parse(text), f"'{text.split(':')[-1]}' is given twice or unknown; write it as {text[:4]}")
-            for text in ("dfet:4x6:hermite", "radau:4x3:lobatto", "shooting:20:cubic", "shooting:20:linear:spline")
-        ),
+        (lambda: parse("dfet:4x6:hermite"), r"'hermite' is none of its words \(lobatto, bernstein\); write it as dfet"),
+        (lambda: parse("radau:4x3:lobatto"), "'lobatto': points is given twice; write it as radau"),
+        (lambda: parse("shooting:20:cubic"), r"'cubic' is none of its words \(constant, linear, spline; .*rk4.*; write it as shooting"),
+        (lambda: parse("shooting:20:linear:spline"), "'spline': control is given twice; write it as shooting"),
         (lambda: from_dict({"method": "Magic"}), "Magic"),
         (lambda: from_dict({"method": "DFET", "settings": {"stages": 3}}), "transcription DFET"),
         (lambda: DFET(0, 1), "DFET: elements must be a whole number of at least 1, not 0"),
