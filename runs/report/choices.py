@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from macs.decisions import Preference, Ranges, from_dict
+from macs.decisions import FuzzySatisfactory, Preference, Ranges, from_dict
+from macs.fronts.pictures.style import COLORS
 from macs.fronts.point import Point
 from macs.io.text import label
 from macs.preferences.pictures import draw_degrees
 
 from .comparison import Comparison
 from .flights import flights_figure
-from .plots import PAGE, legend, new_figure, style
+from .plots import COLUMN, PAGE, legend, new_figure, style
 from .tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
@@ -107,11 +108,35 @@ def choices_figures(comparison: Comparison) -> dict[str, Figure]:
     every, found = chosen(comparison), dict[str, Any]()
     for solver in dict.fromkeys(one.solver for one in every):
         mine = [one for one in every if one.solver == solver]
+        found |= {f"lambda-{solver}-{k}": figure for k, figure in enumerate(lambda_figures(mine), 1)}
         for number, part in enumerate((mine[k : k + SIDE_BY_SIDE] for k in range(0, len(mine), SIDE_BY_SIDE)), 1):
             stem = solver if len(mine) <= SIDE_BY_SIDE else f"{solver}-{number}"
             found[f"degrees-{stem}"] = degrees_figure(part)
             if all(one.point.trajectory is not None for one in part):
                 found[f"flights-{stem}"] = flights_figure([one.point for one in part], names=[one.label for one in part])
+    return found
+
+
+def lambda_figures(every: Sequence[RunChoice]) -> list[Figure]:
+    """Memberships and kappa over lambda, a figure for each order of priority of which there are at least three choices."""
+    by_order = dict[Any, dict[float, np.ndarray]]()
+    for one in every:
+        if isinstance(by := one.preference, FuzzySatisfactory) and not by.ordered:
+            kappa = by.kappa(one.point.goals, one.ranges, one.objectives[None])
+            by_order.setdefault(by.priorities, {}).setdefault(by.regulating, np.concatenate([one.degrees(), kappa]))
+    found = []
+    for priorities, values in by_order.items():
+        if len(values) >= 3:
+            with style():
+                figure = new_figure(COLUMN, 2.7)
+                ax = figure.subplots()
+                names, weights = [*(goal.name for goal in every[0].point.goals), "kappa"], sorted(values)
+                for name, color, line in zip(names, COLORS, zip(*(values[weight] for weight in weights), strict=True), strict=False):
+                    ax.plot(weights, line, "o-", ms=3, lw=1.2, color=color, label=name)
+                ax.axhline(0.0, color="black", lw=0.6)
+                ax.set(xlabel="lambda", ylabel="membership, kappa")
+                legend(figure, ax, f"first {' and '.join(priorities[0])}")
+            found.append(figure)
     return found
 
 

@@ -12,8 +12,9 @@ import numpy as np
 from msgspec import Meta
 
 from macs.baselines.population import PopulationSolver
-from macs.decisions import Preference, Ranges, from_dict
+from macs.decisions import FuzzySatisfactory, Preference, Ranges, from_dict
 from macs.io.text import counted
+from problems.compiled import Objective
 
 from ..execution.task import FinalStates
 from ..files import Number, Section, Text, check_known, checked, errors_begin_with, is_number
@@ -70,6 +71,10 @@ class PublishedTable(Section, tag_field="of", kw_only=True):
     def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
         """Rows of figures of a solver's runs; empty if it has none."""
         raise NotImplementedError
+
+    def completed(self, row: Figures) -> Figures:
+        """A row, the paper's or ours, with the figures that follow from its others."""
+        return row
 
     def remark(self, comparison: Comparison) -> str:
         """A sentence on how our figures were obtained."""
@@ -291,20 +296,28 @@ class PayoffTable(PublishedTable, tag="payoff"):
         check_known(STATISTIC, [row[STATISTIC] for row in self.rows], {BEST + goal.name: goal.name for goal in problem.goals})
 
 
+EQ_53 = "(53) at {:g}"
+"""Key of the value of that equation of Bae and others for a lambda."""
+
+
 class Degrees(PublishedTable, tag="degrees", kw_only=True):
     """How well each choice of solvers that decide satisfies each objective. The `statistic` of a row names the choice; its figures are the
     degrees by name of objectives."""
 
     # The preference by which all choices are measured, {"method": ..., "settings": {...}}. Default: each by its own.
     by: dict[str, Any] | None = None
-    regulating: Any = None  # of studies that older versions made; it means nothing now
+    # Values of lambda for which eq. (53) of Bae and others is evaluated at the memberships, those of the paper's rows, too. Then these
+    # are in order of priority.
+    regulating: tuple[Number, ...] = ()
 
     statistic_head: ClassVar[str] = "choice"
     words: ClassVar[Collection[str] | None] = ()
 
     @property
     def columns(self) -> Mapping[str, Head]:
-        return {name: Head(name, "degree", digits=4) for name in self._names}
+        found = {name: Head(name, "degree", digits=4) for name in self._names}
+        more = ["kappa", *map(EQ_53.format, self.regulating)] if self.regulating else []
+        return found | {key: Head(key, digits=4) for key in more}
 
     def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
         rows: list[Figures] = []
@@ -315,9 +328,29 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
                 rows.append({STATISTIC: one.label + mark, **dict(degrees)})
         return rows
 
+    def completed(self, row: Figures) -> Figures:
+        found, degrees = dict(row), np.array([[row.get(name) for name in self._names]], dtype=float)
+        goals = [Objective(name, "", "maximize") for name in self._names]
+        ranges = Ranges(dict.fromkeys(self._names, 1.0), dict.fromkeys(self._names, 0.0))
+        for key, goal in self._weighed.items() if np.isfinite(degrees).all() else ():
+            found["kappa"] = float(goal.kappa(goals, ranges, degrees)[0])
+            found[key] = float(goal.stages(goals, ranges)[0].numbers(degrees)[0])
+        return found
+
     def remark(self, comparison: Comparison) -> str:
         by = "the preference that chose" if self.preference is None else repr(self.preference)
-        return f"degrees of ours by {by}."
+        return f"degrees of ours by {by}.{''.join(f' {one}' for one in self.optima())}"
+
+    def optima(self) -> list[str]:
+        """For each lambda, the least value of eq. (53) over the paper's rows and the ends of its front."""
+        known: dict[str, Figures] = {f"best {name}": {one: float(one == name) for one in self._names} for name in self._names}
+        known |= {row[STATISTIC]: row for row in self.rows}
+        figures = {name: self.completed(row) for name, row in known.items()}
+        found = []
+        for key, goal in self._weighed.items():
+            value, name = min((float(str(one[key])), name) for name, one in figures.items() if key in one)
+            found.append(f"With lambda = {goal.regulating:g}, eq. (53) is least, of the paper's rows and ends, at '{name}': {value:.4g}.")
+        return found
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         names = [goal.name for goal in problem.goals]
@@ -337,11 +370,18 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
         """Names of the objectives."""
         return list(dict.fromkeys(key for row in self.rows for key in figures_of(row)))
 
+    @property
+    def _weighed(self) -> dict[str, FuzzySatisfactory]:
+        """What minimises eq. (53), for each lambda, by the key of its values."""
+        return {EQ_53.format(weight): FuzzySatisfactory({}, self._names, regulating=weight) for weight in self.regulating}
+
     def __post_init__(self) -> None:
         if self.by is not None:
             with errors_begin_with("by"):
                 from_dict(self.by)
         super().__post_init__()
+        with errors_begin_with("regulating"):
+            _ = self._weighed
 
 
 class DominatedDesigns(PublishedTable, tag="designs"):
@@ -441,7 +481,7 @@ def _beside(comparisons: Sequence[Comparison], paper: PublishedTable, study: Map
         took = max((row["seconds"] for row in theirs if "seconds" in row), default=None)
 
         def cells(figures: Figures, took: float | None) -> list[Cell]:
-            own = figures.get("seconds")
+            own, figures = figures.get("seconds"), paper.completed(figures)
             ratio: list[Cell] = [took / own if took and isinstance(own, float) else None] if timed else []
             return [*([figures.get(STATISTIC)] if paper.statistic_head else []), *(figures.get(key) for key in keys), *ratio]
 

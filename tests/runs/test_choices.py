@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 from misbehaving import glide
 from test_study import Inline
 
 from runs import Study
+from runs.report.published import papers
 
 GOALS = {"method": "FuzzySatisfactory", "settings": {"targets": {}, "priorities": ["distance", "time"]}}
 WIDE = {"method": "PhysicalProgramming", "settings": {"classes": {"time": {"class": "Smaller", "boundaries": [1, 2, 3, 4, 5]}}}}
@@ -21,7 +23,14 @@ CHOICES = {
     },
 }
 ROW = {"problem": "glide", "by": "the paper"}
+ROWS = [
+    {**ROW, "statistic": "0.1", "terminal mass": 0.2695, "terminal speed": 0.3791},
+    {**ROW, "statistic": "0.2", "terminal mass": 1.0, "terminal speed": 0.3011},
+    {**ROW, "statistic": "0.3", "terminal mass": 1.0, "terminal speed": 0.2956},
+]
+"""Table 5 of Bae and others."""
 PAPER = {"of": "degrees", "by": WIDE, "rows": [{**ROW, "statistic": "theirs", "time": 2.5}]}
+SATISFIED = {"of": "degrees", "regulating": [0.1], "rows": [{**ROW, "statistic": "theirs", "distance": 0.5, "time": 0.5}]}
 
 
 def study(**more) -> Study:
@@ -31,7 +40,7 @@ def study(**more) -> Study:
         "evaluations": 60,
         "runs": 1,
         "seed": 1,
-        "paper": [PAPER],
+        "paper": [PAPER, SATISFIED],
         "flights": False,
     }
     return Study("chosen", **given | more)
@@ -71,15 +80,39 @@ def test_what_compares_fronts_is_left_out_and_pictures_are_drawn(folder):
     study().report(folder)
     names = {path.name for path in (folder / "report").iterdir()}
     assert not any("indicators" in name or "attainment" in name for name in names)
-    for figure in ("degrees-choices", "flights-choices"):
+    for figure in ("degrees-choices", "flights-choices", "lambda-choices-1"):
         assert (folder / "report" / f"glide-dfet-2x2-{figure}.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_published_degrees_stand_beside_ours_by_the_same_preference(folder, told):
-    rows = rows_of(folder / "report" / "published.csv")
+    rows = rows_of(folder / "report" / "published-1.csv")
     assert rows[0]["by"] == "the paper" and float(rows[0]["time [degree]"]) == 2.5
     even = next(row for row in rows if row["choice"] == "even")
     assert float(even["time [degree]"]) == pytest.approx(3.0, abs=1e-4)
+
+
+def test_eq_53_at_the_printed_memberships():
+    (paper,) = papers([{"of": "degrees", "regulating": [0.1, 0.2], "rows": ROWS}])
+    found = [paper.completed(row) for row in paper.rows]
+    # By hand: (d_1 + d_2) / 2 + lambda (d_1 - d_2).
+    assert found[0]["kappa"] == pytest.approx(0.7305 - 0.6209)
+    assert found[0]["(53) at 0.1"] == pytest.approx(0.5 * (0.7305 + 0.6209) + 0.1 * (0.7305 - 0.6209))
+    assert found[1]["(53) at 0.2"] == pytest.approx((0.5 - 0.2) * 0.6989)
+    # The row of 0.2 is better than both others for each lambda below a half.
+    for weight in np.linspace(0.0, 0.49, 8):
+        (one,) = papers([{"of": "degrees", "regulating": [float(weight)], "rows": ROWS}])
+        values = [one.completed(row)[f"(53) at {weight:g}"] for row in one.rows]
+        assert np.argmin(values) == 1
+        assert f"at '0.2': {values[1]:.4g}" in " ".join(one.optima())
+
+
+def test_eq_53_of_ours_stands_beside_the_papers(folder, told):
+    rows = rows_of(folder / "report" / "published-2.csv")
+    assert [row["choice"] for row in rows[:2]] == ["theirs", "goals, regulating 0"]
+    # At the middle of the line both memberships are a half; the end of the first objective has 1 and 0.
+    assert [float(row["(53) at 0.1"]) for row in rows if row["choice"] in ("theirs", "even")] == pytest.approx([0.5, 0.5], abs=1e-4)
+    end = next(row for row in rows if row["choice"] == "goals, regulating 0.2")
+    assert float(end["kappa"]) == pytest.approx(-1.0, abs=1e-4) and float(end["(53) at 0.1"]) == pytest.approx(0.4, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -88,6 +121,8 @@ def test_published_degrees_stand_beside_ours_by_the_same_preference(folder, told
         ({**PAPER, "by": {"method": "Wish"}}, "by: unknown preference 'Wish'"),
         ({**PAPER, "rows": [{**ROW, "statistic": "a", "speed": 1.0}]}, "unknown objective 'speed'"),
         ({**PAPER, "rows": [{**ROW, "time": 1.0}]}, "statistic must be a text"),
+        ({**PAPER, "regulating": [0.1]}, "regulating: priorities must have at least two levels"),
+        ({**SATISFIED, "regulating": [-0.1]}, "regulating: regulating must"),
         ({**PAPER, "by": {"method": "WeightedSum", "settings": {"weights": {"speed": 1.0}}}, "rows": PAPER["rows"]}, "speed"),
     ],
 )
