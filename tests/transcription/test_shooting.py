@@ -349,6 +349,13 @@ def test_what_may_be_stable_is_not_refused():
         SingleShooting(31).transcribe(load(case))
 
 
+def test_steps_that_grow_may_be_mended_by_those_between():
+    """A factor of 1.375 in each long step, and of 0.27 in each short one: what should vanish does, from one pair of steps to the next."""
+    pairs = np.tile([3.0, 1.6], 60)
+    edges = (0.0, *(np.cumsum(pairs) / pairs.sum())[:-1].tolist(), 1.0)
+    MultipleShooting(120, mesh={"turn": (edges, 4)}).transcribe(lag(pairs.sum() / 100))
+
+
 def test_the_longest_step_decides():
     """Of 100 equal steps of 1 s each is stable to a rate of 2.785; so are 49 half steps and a last one of 75.5 s only to 0.037."""
     even, tail = np.linspace(0, 1, 101), np.append(0.5e-2 * np.arange(50), 1.0)

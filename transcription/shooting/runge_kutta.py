@@ -164,7 +164,9 @@ def _growing(
         return None
     span, found = np.array([v.span for v in phase.states]), []
     for rates, vectors in map(np.linalg.eig, by_x if np.isfinite(by_x).all() else ()):
-        growth = np.log(np.maximum(np.abs(scheme.stability(np.multiply.outer(steps, rates))), 1.0)).sum(axis=0)
+        each = np.log(np.maximum(np.abs(scheme.stability(np.multiply.outer(steps, rates))), 1e-300))
+        sums = np.cumsum(np.vstack([np.zeros(len(rates)), each]), axis=0)
+        growth = (sums - np.minimum.accumulate(sums, axis=0)).max(axis=0)  # over consecutive steps: others between may let it decay
         growth = np.where((rates.real * length < -UNSTABLE_GROWTH) & (growth > UNSTABLE_GROWTH), growth, 0.0)
         if not growth.any():
             return None
