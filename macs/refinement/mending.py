@@ -169,8 +169,8 @@ class _Mending:
 
     def _as_before(self, points: Points) -> Points:
         """The points, with the original in place of each that was verified originally and no longer is."""
-        unseen = np.flatnonzero(~points.verified & ~self.points.was_simulated).tolist()
-        lost = [i for i in unseen if points.trajectories[i] is not self.points.trajectories[i]]
+        unsure = np.flatnonzero(~points.verified & (self.points.verified | ~self.points.was_simulated)).tolist()
+        lost = [i for i in unsure if points.trajectories[i] is not self.points.trajectories[i]]
         if not lost:
             return points
         old = verified(self.points[lost], self.verify, objective_scales(points), remark=False, simulations=self.simulations)
