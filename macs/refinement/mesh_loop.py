@@ -16,7 +16,7 @@ from transcription.inner import Ipopt
 from transcription.meshed import Meshed
 from transcription.meshes.errors import objective_variations
 from transcription.meshes.minimum import OptimumMultipliers
-from transcription.meshes.moving_edges import switched
+from transcription.meshes.moving_edges import at_switches, switched
 from transcription.meshes.refinement import next_method, redistributed, where_controls_gain
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
 from transcription.nlp.scalarized import Solved
@@ -110,10 +110,11 @@ class OnMesh:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A mesh to try, and whether its result counts only as an improvement."""
+    """A mesh to try, whether its result counts only as an improvement, and whether the first solve stays near the present point."""
 
     method: Meshed
     better: bool = False
+    near: bool = False
 
 
 @dataclass(eq=False)
@@ -280,9 +281,11 @@ class MeshLoop:
         knots = switched(present.method, self.problem, present.trajectory) if knotted else None
         if knots is not None and knots not in seen:
             yield Proposal(knots, better=True)
-        finer = next_method(present.method.settled(present.trajectory), present.verdict, present.trajectory)
+        resting = at_switches(present.method, present.trajectory)
+        begun = present.method.settled(present.trajectory) if resting is None else resting
+        finer = next_method(begun, present.verdict, present.trajectory)
         if finer not in seen:
-            yield Proposal(finer)
+            yield Proposal(finer, near=resting is not None)
             yield from map(Proposal, finer.alternatives())
 
     def _solved(
@@ -291,7 +294,7 @@ class MeshLoop:
         """The point on another mesh, None if no solve converged; and its status."""
         method = proposal.method
         nlp = self.programs(method)
-        solved, by_gradients = self._from_starts(nlp, present, task, others, least)
+        solved, by_gradients = self._from_starts(nlp, present, task, others, least, proposal.near)
         if solved.status != CONVERGED:
             return None, solved.status
         z, F = solved.z, solved.F
@@ -302,15 +305,17 @@ class MeshLoop:
         tried = present.gaining and change <= LOOP.hollow * present.verdict.gain
         return replace(reached, change=change, tried=tried), solved.status
 
-    def _from_starts(self, nlp: NLP, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float) -> tuple[Solved, bool]:
-        """The best result of solves from the present trajectory and, if that fails or gets worse, near it, then from
+    def _from_starts(
+        self, nlp: NLP, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float, near_first: bool
+    ) -> tuple[Solved, bool]:
+        """The best result of solves from the present trajectory and, if that fails or gets worse, near it (or in reverse order), then from
         other starts; and whether it is an optimum. For objectives without derivatives (a maximised peak), the feasible point nearest to the
         present one."""
         if not self._differentiable:
             return self._projected(nlp, nlp.interpolate(present.trajectory))
         bound = task.loss(present.F) if np.isinf(least) else least
         slip = min(LOOP.slip * self.wanted.settled, LOOP.drift)
-        own = [(present.trajectory, False, slip), (present.trajectory, True, LOOP.drift)]
+        own = [(present.trajectory, near_first, slip), (present.trajectory, not near_first, LOOP.drift)]
         attempts = [*own, *((other, False, LOOP.drift) for other in others)]
         starts = (Start(nlp.interpolate(trajectory), near, drift) for trajectory, near, drift in attempts)
         return best_of(task, self.solves, nlp, starts, bound), True

@@ -238,18 +238,60 @@ def next_mesh(method: Meshed, statement: CompiledPhase, phase: PhaseTrajectory, 
     """The mesh of one phase that `switched` proposes, if any; `parameters` are those of the problem."""
     if not phase.tf > phase.t0:
         return None
-    given = method.mesh_of(phase.name)
-    mesh, (low, high), found = given.found_in(phase.state.edges), given.ranges().T, phase_switches(phase)
-    known, slack = np.array(mesh.edges)[list(mesh.moving)], 0.01 * (high - low)
-    # An edge so near to an end of its range would go on.
-    pressed = np.where(known <= low + slack, -1, np.where(known >= high - slack, 1, 0))
-    places = edge_places(found, phase_contacts(statement, phase, parameters), mesh, pressed)
+    edges = _Edges.of(method, phase)
+    mesh, found = edges.mesh, phase_switches(phase)
+    places = edge_places(found, phase_contacts(statement, phase, parameters), mesh, edges.pressed)
     # Within the ranges the solver has moved the edges itself: where a control comes near a bound slowly, it knows better.
-    if len(places) == len(low) and (low <= places).all() and (places <= high).all():
-        return mesh if pressed.any() else replace(mesh, constant=()) if mesh.constant else None
+    if edges.reach(places):
+        return mesh if edges.pressed.any() else replace(mesh, constant=()) if mesh.constant else None
     if len(places) >= max(method.most_elements, 2 * method.elements):
         return None
     return with_edges(mesh, places, on_bounds(phase, found, places))
+
+
+def at_switches(method: Method, trajectory: Trajectory) -> Method | None:
+    """The same method on the meshes of its trajectory, with all moving edges put back at switches of controls, as the start of a finer
+    mesh: the edges may have left them.
+
+    Where an edge may move, an objective has many local optima that differ by less than what counts, since one element of high degree
+    describes the end of an arc nearly as well as two do. In these, the costates are known less well.
+    """
+    if not method.moves_edges:
+        return None
+    found = {}
+    for phase in trajectory.phases:
+        if method.mesh_of(phase.name).moving and phase.tf > phase.t0:
+            edges = _Edges.of(method, phase)
+            places = edge_places(phase_switches(phase), {}, edges.mesh, edges.pressed)
+            if not edges.reach(places):
+                return None
+            own = np.array(edges.mesh.edges)
+            moved = own + edges.mesh.shares @ (np.array(places) - own[list(edges.mesh.moving)])
+            found[phase.name] = replace(edges.mesh, edges=tuple(moved.tolist()))
+    return method.remeshed(found) if found else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """The mesh of a phase as it lies in a trajectory; its moving edges' ranges (m, 2), and whether each is at an end of it: -1, 0 or 1."""
+
+    mesh: PhaseMesh
+    pressed: np.ndarray
+    ranges: np.ndarray
+
+    @classmethod
+    def of(cls, method: Meshed, phase: PhaseTrajectory) -> _Edges:
+        """Those of a phase of a trajectory that the method made."""
+        given = method.mesh_of(phase.name)
+        mesh, ranges = given.found_in(phase.state.edges), given.ranges()
+        known, (low, high) = np.array(mesh.edges)[list(mesh.moving)], ranges.T
+        slack = 0.01 * (high - low)  # an edge so near to an end of its range would go on
+        return cls(mesh, np.where(known <= low + slack, -1, np.where(known >= high - slack, 1, 0)), ranges)
+
+    def reach(self, places: Sequence[float]) -> bool:
+        """Whether there are as many places as moving edges, each within the range of its edge."""
+        low, high = self.ranges.T
+        return len(places) == len(low) and bool((low <= places).all() and (places <= high).all())
 
 
 def phase_switches(phase: PhaseTrajectory) -> dict[str, list[Switch]]:
