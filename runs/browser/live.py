@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
+from os import PathLike, stat_result
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -36,8 +36,16 @@ T = TypeVar("T")
 
 def stamps_of(*paths: Path) -> str:
     """A text that differs once one of some files has been written again, or is gone: their numbers, sizes and times."""
-    known = [path.stat() if path.exists() else None for path in paths]
+    known = [_stat(path) for path in paths]
     return str([one and (one.st_ino, one.st_size, one.st_mtime_ns) for one in known])
+
+
+def _stat(path: Path) -> stat_result | None:
+    """About a file; None if it is not there, or gone by now."""
+    try:
+        return path.stat()
+    except OSError:
+        return None
 
 
 class Readings:
@@ -302,7 +310,7 @@ def _going(summary: StudySummary, progress: ProgressRecord | None) -> dict[Key, 
     for run in summary.runs:
         key, path = key_of(run), samples_path(run.path.with_suffix(".checkpoint"))
         # On the workers of an executor only the samples show that a run is being made.
-        if not run.finished and (key in told or (path.exists() and path.stat().st_mtime >= progress.began)):
+        if not run.finished and (key in told or ((known := _stat(path)) and known.st_mtime >= progress.began)):
             last = _last_sample(path)
             found[key] = replace(last, evaluations=told[key].evaluations, elapsed=told[key].elapsed) if key in told else last
     return found

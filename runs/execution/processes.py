@@ -65,7 +65,11 @@ class Child:
         self._lock = threading.Lock()
 
     def perform(self, task: RunTask, report: Report | None = None) -> RunOutcome:
-        """The outcome of a run."""
+        """The outcome of a run. If its process is killed from outside, the run is begun once more."""
+        outcome = self._attempt(task, report)
+        return self._attempt(task, report) if outcome.status == KILLED and not self._closed else outcome
+
+    def _attempt(self, task: RunTask, report: Report | None) -> RunOutcome:
         if not self._begin(task):
             return self._ended(task, 0.0)
         began = time.perf_counter()

@@ -89,16 +89,15 @@ class Flights:
         """{name of a file: figure}."""
         law: Callable[[float], Law] | None = getattr(self.case, "optimal_flight", None)
         laws = [law(float(point.trajectory.phases[-1].time[-1])) if law and point.trajectory else None for point in self.points]
-        found = {
-            "representatives": front_figure(
+        found = {"flights": flights_figure(self.points, laws=laws, law_name=getattr(self.case, "LAW", "known law"), solver=self.solver)}
+        if len(self.comparison.known.goals) > 1:
+            found["representatives"] = front_figure(
                 {self.solver: self.comparison.fronts[self.solver]},
                 goals=self.comparison.known.goals,
                 reference=self.comparison.against.front,
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,
-            ),
-            "flights": flights_figure(self.points, laws=laws, law_name=getattr(self.case, "LAW", "known law"), solver=self.solver),
-        }
+            )
         plot = getattr(self.case, "plot", None)
         if plot is not None:
             with style():

@@ -151,7 +151,7 @@ def late(tmp_path_factory):
 
 @pytest.mark.slow
 def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(late, tmp_path):
-    solvers = {"crash": Crashing(), "hang": Hanging(), "hungry": Hungry(), "dead": Dying()}
+    solvers = {"crash": Crashing(), "hang": Hanging(), "hungry": Hungry(), "dead": Dying(), "once": Dying(once=str(tmp_path / "died"))}
     summary = study(solvers={**solvers, "plain": Plain()}, runs=1, time_limit=late).run(tmp_path / "out")
     status = {cell.solver: [run.status for run in runs] for cell, runs in summary.cells.items()}
     assert status == {
@@ -159,6 +159,7 @@ def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(late, 
         "hang": ["timeout"],
         "hungry": ["out of memory"],
         "dead": ["killed"],
+        "once": ["finished"],  # one whose process is killed is begun once more
         "plain": ["finished"],
     }
     run = {run.cell.solver: run for run in summary.runs}
@@ -169,7 +170,7 @@ def test_failures_are_recorded_with_their_traceback_and_stop_no_other_run(late, 
     with pytest.raises(FileNotFoundError):
         _ = run["dead"].front
     text = str(summary)
-    assert "1 of 5 runs finished" in text and "run 1 of glide, dfet:2x2, crash: crashed: ArithmeticError: the root of all evil" in text
+    assert "2 of 6 runs finished" in text and "run 1 of glide, dfet:2x2, crash: crashed: ArithmeticError: the root of all evil" in text
 
 
 def test_what_was_killed_or_late_is_made_again_and_what_crashed_if_asked(tmp_path):
