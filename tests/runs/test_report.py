@@ -13,7 +13,7 @@ from test_study import Inline
 
 from macs import Front
 from macs.gradient_solvers import Payoff
-from problems import load
+from problems import Problem, load
 from runs import Study, gd, igd
 from runs.batch.store import Store
 from runs.cli import main
@@ -278,3 +278,16 @@ def test_labels_that_differ_in_signs_alone_have_files_of_their_own(tmp_path):
         writer.table(f"mass {value:+d} %", table(["shift"], [[value]], "of the mass"))
     assert len(set(writer.files)) == len(writer.files) == 6 and all(path.exists() for path in writer.files)
     assert [path.name for path in writer.files if path.suffix == ".csv"] == ["mass-5.csv", "mass-5-2.csv"]
+
+
+@pytest.mark.slow
+def test_of_one_objective_there_are_flights_but_no_fronts(tmp_path):
+    problem = Problem("alone")
+    leg = problem.phase("leg", t0=0.0, tf=(1.0, 5.0))
+    leg.state("x", bounds=(0, 9), initial=0, final=3)
+    leg.dynamics(x=leg.control("u", bounds=(0, 3)))
+    problem.minimize("time", leg.tf, unit="s")
+    alone = study(problems=problem, transcriptions="dfet:2x2", solvers={"best": {"solver": "optimum"}}, paper=[], goal=None)
+    alone.run(tmp_path, executor=Inline())
+    names = {path.name for path in alone.report(tmp_path).files}
+    assert "alone-dfet-2x2-flights.png" in names and not any("fronts" in name for name in names)
