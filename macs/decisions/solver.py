@@ -30,7 +30,7 @@ from ..gradients.scalarised import GradientSolves
 from ..io.console import working
 from ..preferences.preference import BEYOND, CONFIRMED, Preference, keeps_limits, standing, within_limits
 from ..preferences.ranges import Ranges, shown
-from ..preferences.stage import LIMIT_TOL, Stage, conflict_message, exceeded, excess_stage, ordering
+from ..preferences.stage import LIMIT_TOL, Stage, check_limits, conflict_message, exceeded, excess_stage, ordering
 from ..refinement.mesh_search import coarse_meshes
 from ..solvers.start import beginning
 from .choice import Choice, Step
@@ -127,6 +127,7 @@ class DecisionSolver:
         """
         self._preference, self._about = preference, about or {}
         stages = stages or preference.stages(self.problem.goals, self.ranges)
+        check_limits(stages)
         limits = stages[0]
         candidates = [*also, *self._ranked()]
         try:

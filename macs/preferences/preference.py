@@ -19,7 +19,7 @@ from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..io.text import counted, numbers, text_table
 from .ranges import Ranges, confidence, places, sense_and_unit
-from .stage import LIMIT_TOL, Stage, exceeded, ordering
+from .stage import LIMIT_TOL, Stage, check_limits, exceeded, ordering
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -123,6 +123,7 @@ class Preference(ABC):
             raise ValueError(f"the front has no feasible point to rank{f': {front.message}' if front.message else ''}")
         ranges = Ranges.of(front) if ranges is None else ranges
         stages: Sequence[Stage] = self.stages(front.goals, ranges)
+        check_limits(stages)
         J, rank = front.objectives, standing(stages[0], front)
         with np.errstate(invalid="ignore"):
             tie = np.sum(ranges.normalised(front.goals, list(J.T)), axis=0)

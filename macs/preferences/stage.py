@@ -166,6 +166,13 @@ def conflict_message(limits: Stage, goals: Sequence[Objective], J: np.ndarray) -
     return f"no point was found that meets {what}; the nearest has {nearest}: {exceeded(limits, goals, J)}"
 
 
+def check_limits(stages: Sequence[Stage]) -> None:
+    """Raise ValueError for stages after the first with hard limits."""
+    for stage in stages[1:]:
+        if stage.limited:
+            raise ValueError(f"hard limits are those of the first stage, which all stages keep: state those of '{stage.name}' there")
+
+
 def ordering(
     stages: Sequence[Stage], objectives: np.ndarray, kind: np.ndarray, tie: np.ndarray | None = None, same: float = ATTAINED
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -177,9 +184,6 @@ def ordering(
         found = stage.numbers(objectives)
         follows = columns[-1] <= same if columns and stage.after_zero else np.ones(len(found), dtype=bool)
         columns.append(np.where(follows, found, np.nan))
-    for stage in stages[1:]:
-        if stage.limited:
-            raise ValueError(f"hard limits are those of the first stage: '{stage.name}' has some, too")
     excess = stages[0].excess(objectives)
     excess = np.where(excess > LIMIT_TOL, excess, 0.0)
     keys = [*((kind, 0.0), (excess, 0.0)), *((one, same) for one in columns[:-1]), (columns[-1], 0.0)]

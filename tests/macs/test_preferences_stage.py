@@ -12,7 +12,7 @@ from choices import cart, plain_front
 
 from macs.decisions import Preference, Stage
 from macs.preferences.preference import keeps_limits, within_limits
-from macs.preferences.stage import LIMIT_TOL, conflict_message, exceeded, ordering
+from macs.preferences.stage import LIMIT_TOL, check_limits, conflict_message, exceeded, ordering
 from problems.compiled import Objective
 
 GOALS = (Objective("time", "s"), Objective("mass", "kg", "maximize"), Objective("risk"))
@@ -101,8 +101,9 @@ def test_the_kind_comes_first_then_the_limits_and_then_the_values() -> None:
 
 
 def test_limits_are_those_of_the_first_stage() -> None:
-    with pytest.raises(ValueError, match="hard limits are those of the first stage: 'limited' has some, too"):
-        ordering([FREE, LIMITED], rows((1.0, 7.0, 3.0)), np.zeros(1))
+    with pytest.raises(ValueError, match="hard limits are those of the first stage, which all stages keep: state those of 'limited' there"):
+        check_limits([FREE, LIMITED])
+    check_limits([LIMITED, FREE])
 
 
 def test_later_stages_tell_apart_what_is_as_good_as_the_best() -> None:
