@@ -126,13 +126,18 @@ def test_a_hundred_runs_of_a_hundred_points_open_with_the_work_of_the_drawing_pa
     contents = {"package alone": package_alone(), "10 points": front_page(flights(10)), "10 000 points": study_like(100, 100)}
     assert len(contents["10 000 points"]) < 15e6
     path, work = tmp_path / "page.html", dict.fromkeys(contents, float("inf"))
+
+    def is_quick() -> bool:
+        return work["10 000 points"] < 1.25 * work["package alone"] and work["10 points"] < 0.85 * work["package alone"]
+
     for _ in range(3):  # side by side: the least of each is what its page costs, whatever else the machine does
         for name, content in contents.items():
             path.write_bytes(content)
             work[name] = min(work[name], work_of(path, READY))
-    print(work)
+        if is_quick():
+            break
     # Two seconds are asked for: on two idle cores it took 1.2 s with this work. On a busy machine seconds say nothing of the page.
-    assert work["10 000 points"] < 1.25 * work["package alone"] and work["10 points"] < 0.85 * work["package alone"]
+    assert is_quick(), work
 
 
 @pytest.mark.slow
