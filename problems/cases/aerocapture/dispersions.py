@@ -150,9 +150,9 @@ class DispersedOutcome:
         """By name and unit: shares of the cases, and of those that are captured the 99th percentile, P99, of what should be small, and
         the first of the altitude; None if no case is captured."""
         found: dict[tuple[str, str], float | None] = {}
-        for name, which in (("captured", self.captured), ("lost in the air", self.lost), ("on target", self.on_target)):
-            if which is not None:
-                found[name, "%"] = 100.0 * float(which.mean())
+        for name, mask in (("captured", self.captured), ("lost in the air", self.lost), ("on target", self.on_target)):
+            if mask is not None:
+                found[name, "%"] = 100.0 * float(mask.mean())
         worst = {
             ("apoapsis error, P99", "km"): (np.abs(self.apoapsis_error), 99.0),
             ("delta v, P99", "m/s"): (self.delta_v, 99.0),
