@@ -10,6 +10,7 @@ import pytest
 from cases import decay, integrator, oscillator, oscillator_rates, propagated, slot
 from gauss import integrate
 
+from macs import optimize
 from problems import Problem, load
 from transcription import DFET, parse
 from transcription.nlp.scalarized import scalarize
@@ -189,3 +190,20 @@ def test_a_closed_curve_of_unit_speed_encloses_a_circle(word: str, area: float, 
     solved = scalarize(nlp, nlp.first_guess(middle[None])[0], reference=np.zeros(1), weights=np.ones(1))
     assert solved.status == "converged" and solved.violation < 1e-6
     assert abs(-solved.F[0] / area - 1) < miss
+
+
+def mountain_car(most: float) -> Problem:
+    """Moore's car, which has to swing: https://openmdao.github.io/dymos/examples/mountain_car/mountain_car.html; 102.367536 s by shooting."""
+    problem = Problem("mountain car")
+    hill = problem.phase("hill", t0=0.0, tf=(90.0, 120.0))
+    x = hill.state("x", bounds=(-1.2, most), initial=-0.5, final=0.5)
+    v = hill.state("v", bounds=(-0.07, 0.07), initial=0.0, final=(0.0, 0.07))
+    u = hill.control("u", bounds=(-1.0, 1.0))
+    hill.dynamics(x=v, v=0.001 * u - 0.0025 * ca.cos(3 * x))
+    problem.minimize("time", hill.tf)
+    return problem
+
+
+def test_a_bound_at_the_end_that_is_imposed_changes_nothing():
+    at_bound, inside = (optimize(mountain_car(most), DFET(8, 4), starts=1).objectives["time"] for most in (0.5, 0.7))
+    assert at_bound == pytest.approx(inside, abs=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -11,6 +12,8 @@ from problems.compiled import Variable
 
 HIDDEN = 2**40
 """Slots from here on are those of hidden quantities: how many variables come before them is known only in the end."""
+PASSED = 1e-3
+"""How much a variable passes its bounds where something else bounds what it describes, in scales."""
 
 
 class Layout:
@@ -43,6 +46,12 @@ class Layout:
             [[self.add(v.named(f"{prefix}{v.name}[{j},{k}]"), free=free) for v in variables] for k in range(columns)] for j in range(rows)
         ]
         return np.array(slots, dtype=int).reshape(rows, columns, len(variables))
+
+    def widen(self, *slots: np.ndarray) -> None:
+        """Let variables pass their bounds by `PASSED`."""
+        for slot in np.concatenate(slots).tolist():
+            v = self.variables[slot]
+            self.variables[slot] = replace(v, lower=v.lower - PASSED * v.scale, upper=v.upper + PASSED * v.scale)
 
     def add_hidden(self, *shape: int) -> np.ndarray:
         """Hidden quantities; returns slots of this shape."""
