@@ -193,7 +193,7 @@ def test_a_closed_curve_of_unit_speed_encloses_a_circle(word: str, area: float, 
 
 
 def mountain_car(most: float) -> Problem:
-    """Moore's car, which has to swing: https://openmdao.github.io/dymos/examples/mountain_car/mountain_car.html; 102.367536 s by shooting."""
+    """Moore's car, which has to swing: https://openmdao.github.io/dymos/examples/mountain_car/mountain_car.html."""
     problem = Problem("mountain car")
     hill = problem.phase("hill", t0=0.0, tf=(90.0, 120.0))
     x = hill.state("x", bounds=(-1.2, most), initial=-0.5, final=0.5)

@@ -46,8 +46,8 @@ class ElementsPhase(PhaseWriter):
         self.X = layout.add_table(prefix, phase.states, elements, tables.coefficients)
         at_edges = [v.named(f"{v.name}[edge]") for v in phase.states]
         if {-1.0, 1.0} <= set(tables.nodes):
-            # A polynomial meets the values that are imposed at the ends of a phase to its own error only. Where these are bounds of a state,
-            # its coefficient there has no bound of its own: that error would be one-sided, and would hold edges and controls in place.
+            # A polynomial meets the values imposed at the ends of a phase to its own error only. Where these are bounds of a state, its
+            # coefficient there has no bound of its own: the error would be one-sided, and would hold edges and controls in place.
             layout.widen(self.X[0, 0, ends.initial < 0], self.X[-1, -1, ends.final < 0])
         self.interior = self.X.ravel()
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
