@@ -159,16 +159,13 @@ def test_undone_saved_and_gone_on_with(tmp_path: Path) -> None:
     assert one.point.decision.tobytes() == other.point.decision.tobytes() and one.values == other.values
 
 
-def test_a_problem_of_a_script_is_asked_for(tmp_path: Path) -> None:
+def test_files_are_read_by_others_and_computed_again(tmp_path: Path) -> None:
     dialogue, path = begun(), tmp_path / "choice.json"
     dialogue.choose()
     dialogue.save(path)
     assert Dialogue.load(path).problem is None
     with pytest.raises(ValueError, match="belongs to problem 'cart'"):
         Dialogue.load(path, two_wells())
-
-
-def test_readers_find_the_choice_in_numbers(tmp_path: Path) -> None:
     dialogue, path = Dialogue(front()), tmp_path / "choice.json"
     now = dialogue.choose()
     dialogue.improve("time")
@@ -181,6 +178,15 @@ def test_readers_find_the_choice_in_numbers(tmp_path: Path) -> None:
     data["choice"]["objectives"]["time"] = data["history"][0]["choice"]["degrees"]["time"] = -5.0
     path.write_text(json.dumps(data))
     assert Dialogue.load(path).table() == dialogue.table()
+    path = tmp_path / "x.json"
+    for content, words in (("", "not JSON"), ("{", "not JSON"), ("[]", "something else"), ("[" * 100_000, "nested too deeply")):
+        path.write_text(content)
+        with pytest.raises(ValueError, match=words):
+            Dialogue.load(path)
+    with pytest.raises(FileNotFoundError, match="there is no file"):
+        Dialogue.load(tmp_path / "none.json")
+    with pytest.raises(OSError, match="there is no folder"):
+        Dialogue(front()).save(tmp_path / "none" / "x.json")
 
 
 @pytest.mark.parametrize(
@@ -218,19 +224,7 @@ def test_damaged_files_are_one_line(tmp_path: Path, keys: list[Any], to: Any, wo
     assert words in said and said.startswith(f"{path} does not hold a dialogue that can be read: ") and "\n" not in said
 
 
-def test_other_files_are_no_dialogues(tmp_path: Path) -> None:
-    path = tmp_path / "x.json"
-    for content, words in (("", "not JSON"), ("{", "not JSON"), ("[]", "something else"), ("[" * 100_000, "nested too deeply")):
-        path.write_text(content)
-        with pytest.raises(ValueError, match=words):
-            Dialogue.load(path)
-    with pytest.raises(FileNotFoundError, match="there is no file"):
-        Dialogue.load(tmp_path / "none.json")
-    with pytest.raises(OSError, match="there is no folder"):
-        Dialogue(front()).save(tmp_path / "none" / "x.json")
-
-
-def test_what_is_wrong_adds_no_turn() -> None:
+def test_what_is_wrong_adds_no_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     dialogue = Dialogue(front())
     now = dialogue.choose().objectives
     calls: list[tuple[Any, str]] = [
@@ -254,6 +248,16 @@ def test_what_is_wrong_adds_no_turn() -> None:
     dialogue.improve("time")
     with pytest.raises(ValueError, match="'time' is at its best value"):
         dialogue.improve("time")
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    dialogue = begun()
+    now = dialogue.choose()
+    monkeypatch.setattr("macs.decisions.dialogue.decide", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        dialogue.improve("time")
+    assert len(dialogue.history) == 1 and dialogue.choose() is now
 
 
 def test_what_no_dialogue_is_about() -> None:
@@ -322,15 +326,3 @@ def test_more_objectives() -> None:
     after = dialogue.improve("from 0", giving={"from 1": limit}).objectives
     assert after["from 0"] < now["from 0"] - 0.05 and after["from 1"] <= limit + 1e-5 and after["from 2"] <= now["from 2"] + 1e-5
     assert len(dialogue.plot(figure=Figure(layout="constrained"))) == 4
-
-
-def test_an_improvement_that_is_interrupted_leaves_no_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: Any, **__: Any) -> None:
-        raise KeyboardInterrupt
-
-    dialogue = begun()
-    now = dialogue.choose()
-    monkeypatch.setattr("macs.decisions.dialogue.decide", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        dialogue.improve("time")
-    assert len(dialogue.history) == 1 and dialogue.choose() is now

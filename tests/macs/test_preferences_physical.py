@@ -131,8 +131,7 @@ def test_the_spline_is_the_quartic_with_its_ends_and_slopes():
         # p = a xi^4 / 12 + b (xi - 1)^4 / 12 + c xi + d.
         rows = [[0, 1 / 12, 0, 1], [1 / 12, 0, 1, 1], [0, -1 / 3, 1, 0], [1 / 3, 0, 1, 0]]
         a, b, c, d = np.linalg.solve(rows, [z[k], z[k + 1], slope[k] * length[k], slope[k + 1] * length[k]])
-        assert a > 0
-        assert b > 0
+        assert a > 0 and b > 0
         xi = np.linspace(0, 1, 11)
         assert function(marks[k] + xi * length[k]) == pytest.approx(a * xi**4 / 12 + b * (xi - 1) ** 4 / 12 + c * xi + d, rel=1e-12)
 
@@ -174,9 +173,6 @@ def test_the_value_is_the_logarithm_of_the_mean_and_the_last_boundary_a_hard_lim
     least = minimize_scalar(lambda t: p["time"](t) + p["effort"](12 / t**3), bounds=(1.3, 3.5), method="bounded").x
     assert ranking.best.objectives["time"] == pytest.approx(least, abs=2e-3)
     assert ranking.message == ""
-
-
-def test_a_class_for_some_objectives_leaves_the_others_free():
     ranking = PhysicalProgramming({"time": Value(1, 1.2, 1.5, 1.9, 2.0, 2.1, 2.5, 3, 3.5)}).rank(cart(2801))
     assert ranking.best.objectives["time"] == pytest.approx(2.0, abs=1e-3)
     assert np.isnan(ranking.degrees[:, 1]).all()
@@ -268,9 +264,7 @@ def test_tends_to_the_crisp_one_with_the_square_of_the_spread(one):
         fuzzy = FuzzyPhysicalProgramming({"J": one}, spread={"J": part * gap}).fuzzy_functions["J"]
         off.append(np.abs(fuzzy(J) / crisp(J) - 1).max())
     # At a kink of the second derivative, too: it takes its mean there.
-    assert off[1] < 0.02 * off[0]
-    assert off[2] < 0.02 * off[1]
-    assert off[2] < 1e-3
+    assert off[1] < 0.02 * off[0] and off[2] < 0.02 * off[1] and off[2] < 1e-3
 
 
 @pytest.mark.parametrize("printed", [False, True])

@@ -15,11 +15,22 @@ GOALS = (Objective("cost"), Objective("speed", "m/s", "maximize"))
 RANGES = Ranges({"cost": 2.0, "speed": 30.0}, {"cost": 6.0, "speed": 10.0})
 
 
-def test_over_objectives_best_and_worst_follow_the_senses():
+def test_best_and_worst_follow_the_senses_and_are_normalised_to_0_and_1():
     found = Ranges.over(GOALS, np.array([[3.0, 20.0], [2.0, 10.0], [6.0, 30.0], [4.0, 15.0]]))
     assert found == RANGES
     assert found.to_dict() == {"best": {"cost": 2.0, "speed": 30.0}, "worst": {"cost": 6.0, "speed": 10.0}}
     assert Ranges(**found.to_dict()) == found
+    best, worst = RANGES.ends(GOALS)
+    assert best.tolist() == [2.0, 30.0] and worst.tolist() == [6.0, 10.0]
+    assert RANGES.spans(GOALS).tolist() == [4.0, 20.0]
+    assert RANGES.normalised(GOALS, [2.0, 30.0]) == [0.0, 0.0]
+    assert RANGES.normalised(GOALS, [6.0, 10.0]) == [1.0, 1.0]
+    assert RANGES.normalised(GOALS, [3.0, 25.0]) == [0.25, 0.25]
+    flat = Ranges({"cost": 5.0, "speed": 0.0}, {"cost": 5.0, "speed": 0.0})
+    assert flat.spans(GOALS).tolist() == [5.0, 1.0]
+    assert flat.normalised(GOALS, [7.5, -3.0]) == [0.5, 3.0]
+    assert Ranges({"cost": 5.0, "speed": 1e-3}, {"cost": 5.5, "speed": 0.0}).spans(GOALS).tolist() == [0.5, 1e-3]
+    assert Ranges({"cost": -5.0, "speed": 0.5}, {"cost": -5.0, "speed": 0.5}).spans(GOALS).tolist() == [5.0, 0.5]
 
 
 @pytest.mark.parametrize("sense", ["minimize", "maximize"])
@@ -28,23 +39,6 @@ def test_zero_has_no_sign(sense):
     goals = (Objective("speed", "", sense),)
     for found in (Ranges.over(goals, np.array([[-0.0], [-0.0]])), Ranges.of(plain_front(np.array([[-0.0]]), list(goals)))):
         assert [str(value) for value in (found.best["speed"], found.worst["speed"])] == ["0.0", "0.0"]
-
-
-def test_the_best_is_at_0_and_the_worst_at_1():
-    best, worst = RANGES.ends(GOALS)
-    assert best.tolist() == [2.0, 30.0] and worst.tolist() == [6.0, 10.0]
-    assert RANGES.spans(GOALS).tolist() == [4.0, 20.0]
-    assert RANGES.normalised(GOALS, [2.0, 30.0]) == [0.0, 0.0]
-    assert RANGES.normalised(GOALS, [6.0, 10.0]) == [1.0, 1.0]
-    assert RANGES.normalised(GOALS, [3.0, 25.0]) == [0.25, 0.25]
-
-
-def test_a_range_without_width_is_divided_by_its_size_or_by_1():
-    flat = Ranges({"cost": 5.0, "speed": 0.0}, {"cost": 5.0, "speed": 0.0})
-    assert flat.spans(GOALS).tolist() == [5.0, 1.0]
-    assert flat.normalised(GOALS, [7.5, -3.0]) == [0.5, 3.0]
-    assert Ranges({"cost": 5.0, "speed": 1e-3}, {"cost": 5.5, "speed": 0.0}).spans(GOALS).tolist() == [0.5, 1e-3]
-    assert Ranges({"cost": -5.0, "speed": 0.5}, {"cost": -5.0, "speed": 0.5}).spans(GOALS).tolist() == [5.0, 0.5]
 
 
 def test_what_ranges_have_to_name():
@@ -58,24 +52,16 @@ def test_what_ranges_have_to_name():
         Ranges({"cost": 0.0, "speed": 1.0}, {"cost": 1.0, "speed": 2.0}).ends(GOALS)
 
 
-@pytest.mark.parametrize(("value", "inside"), [(2.0, True), (6.0, True), (1.9999, False), (6.0001, False), (2.0 - 1e-9, True), (4.0, True)])
-def test_a_value_lies_within_a_range_as_far_as_solves_find_ends(value, inside):
-    if inside:
-        RANGES.check(value, GOALS[0], "the aim")
-        return
-    with pytest.raises(ValueError, match=r"the aim of 'cost', .*, lies beyond its range: best 2, worst 6"):
-        RANGES.check(value, GOALS[0], "the aim")
-
-
-def test_a_range_without_width_says_nothing_of_values():
+def test_a_value_lies_within_a_range_as_far_as_solves_find_ends():
+    for inside in (2.0, 6.0, 2.0 - 1e-9, 4.0):
+        RANGES.check(inside, GOALS[0], "the aim")
+    for outside in (1.9999, 6.0001):
+        with pytest.raises(ValueError, match=r"the aim of 'cost', .*, lies beyond its range: best 2, worst 6"):
+            RANGES.check(outside, GOALS[0], "the aim")
+    # One without width says nothing of values.
     Ranges({"cost": 5.0}, {"cost": 5.0}).check(9.0, GOALS[0], "the aim")
     with pytest.raises(ValueError, match="best 30 m/s, worst 10 m/s"):
         RANGES.check(31.0, GOALS[1], "the aim")
-
-
-def test_points_are_believed_by_their_status_and_their_simulation():
-    front = marked(plain_front(np.array([[1.0, 9.0], [2.0, 5.0], [3.0, np.inf], [4.0, 1.0]]), GOALS), [True, False, True, True])
-    assert confidence(front).tolist() == [0, 1, 2, 0]
 
 
 def rows(*objectives, **columns):
@@ -85,19 +71,15 @@ def rows(*objectives, **columns):
 def test_ranges_of_a_front_are_those_of_its_feasible_points_that_no_other_dominates():
     front = rows((1.0, 10.0), (2.0, 30.0), (3.0, 20.0), (0.0, 99.0), status=["converged"] * 3 + ["infeasible"])
     assert Ranges.of(front) == Ranges({"cost": 1.0, "speed": 30.0}, {"cost": 2.0, "speed": 10.0})
-
-
-def test_points_that_a_simulation_contradicts_do_not_count_unless_fewer_than_two_are_left():
     front = rows((1.0, 10.0), (2.0, 30.0), (3.0, 40.0))
     assert Ranges.of(marked(front, [True, True, False])).worst["cost"] == 2.0
     assert Ranges.of(marked(front, [True, False, False])).worst["cost"] == 3.0
     assert Ranges.of(marked(front, [False, False, False])).worst["cost"] == 3.0
     payoff = front.replace(solver={"name": "payoff", "settings": {}})
     assert Ranges.of(marked(payoff, [True, True, False])).worst["cost"] == 3.0, "a payoff table keeps all its ends"
-
-
-def test_what_has_no_ranges_says_so():
     with pytest.raises(ValueError, match=r"^the front has no feasible point, so that it has no ranges$"):
         Ranges.of(rows((1.0, 1.0), status=["failed"]))
     with pytest.raises(ValueError, match=r"^the front has no feasible point, so that it has no ranges: nothing there$"):
         Ranges.of(rows((1.0, 1.0), status=["failed"]).replace(message="nothing there"))
+    front = marked(plain_front(np.array([[1.0, 9.0], [2.0, 5.0], [3.0, np.inf], [4.0, 1.0]]), GOALS), [True, False, True, True])
+    assert confidence(front).tolist() == [0, 1, 2, 0]

@@ -36,11 +36,8 @@ def rows(*J: tuple[float, ...]) -> np.ndarray:
 def test_peaks_are_the_largest_of_their_groups() -> None:
     assert LIMITED.numbers(rows((1.0, 7.0, 3.0), (2.0, 5.0, 2.0))) == pytest.approx([1.0 + 70.0 + 300.0, 2.0 + 50.0 + 200.0])
     assert Stage("same", lambda J, peaks: 3.0).numbers(rows((1.0,), (2.0,))).tolist() == [3.0, 3.0], "a number for all points"
-    assert Stage("peak", lambda J, peaks: peaks[0], lambda J: [[0.0, J[0], 1.0]]).numbers(rows((0.5,), (2.0,), (-1.0,))).tolist() == [
-        1,
-        2,
-        1,
-    ]
+    largest = Stage("peak", lambda J, peaks: peaks[0], lambda J: [[0.0, J[0], 1.0]])
+    assert largest.numbers(rows((0.5,), (2.0,), (-1.0,))).tolist() == [1, 2, 1]
 
 
 def test_what_exceeds_a_limit_has_no_value() -> None:
@@ -50,9 +47,6 @@ def test_what_exceeds_a_limit_has_no_value() -> None:
     assert LIMITED.excesses(rows((1.0, 7.0, 3.0))) == pytest.approx(rows((-0.5, -0.2, -2.0)))
     assert LIMITED.excess(rows((1.0, 7.0, 3.0))).tolist() == [0.0], "met by more is met"
     assert Stage("one", lambda J, peaks: J[0], limits=lambda J: [0.5]).excess(rows((1.0,), (2.0,))).tolist() == [0.5, 0.5]
-
-
-def test_without_limits_nothing_is_exceeded_but_by_what_is_no_number() -> None:
     J = rows((1.0, 2.0), (np.nan, 2.0), (1.0, np.inf), (-np.inf, 0.0))
     assert FREE.excess(J).tolist() == [0.0, 0.0, 0.0, 0.0] and FREE.excesses(J).shape == (4, 0)
     assert FREE.numbers(J).tolist() == [1.0, np.inf, np.inf, np.inf]
@@ -62,10 +56,8 @@ def test_without_limits_nothing_is_exceeded_but_by_what_is_no_number() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_values_that_are_no_numbers_do_not_warn() -> None:
-    found = Stage("root", lambda J, peaks: np.sqrt(J[0]), lambda J: [[np.log(J[0])]], lambda J: [1.0 / J[0] - 3.0]).numbers(
-        rows((0.0,), (4.0,))
-    )
-    assert found.tolist() == [np.inf, 2.0]
+    root = Stage("root", lambda J, peaks: np.sqrt(J[0]), lambda J: [[np.log(J[0])]], lambda J: [1.0 / J[0] - 3.0])
+    assert root.numbers(rows((0.0,), (4.0,))).tolist() == [np.inf, 2.0]
 
 
 def test_what_is_missed_is_said_in_the_unit_of_its_objective() -> None:
@@ -98,15 +90,14 @@ def test_the_kind_comes_first_then_the_limits_and_then_the_values() -> None:
     assert order.tolist() == [1, 0, 3, 2, 4] and values[:, 0].tolist() == [4.0, 3.0, np.inf, np.inf, 0.0]
     # Rounding is no excess, so that it does not order.
     assert ordered([limited], rows((2.0, 1.0), (1.0, 1.0 + 0.9 * LIMIT_TOL))) == [1, 0]
-
-
-def test_limits_are_those_of_the_first_stage() -> None:
+    limited = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1]])
+    assert ordered([limited, FREE], rows((1.0, np.nan), (0.0, np.inf), (2.0, 0.0), (0.0, 0.5), (1.0, 0.5))) == [2, 3, 4, 0, 1]
     with pytest.raises(ValueError, match="hard limits are those of the first stage, which all stages keep: state those of 'limited' there"):
         check_limits([FREE, LIMITED])
     check_limits([LIMITED, FREE])
 
 
-def test_later_stages_tell_apart_what_is_as_good_as_the_best() -> None:
+def test_later_stages_and_ties_tell_apart_what_is_as_good_as_the_best() -> None:
     second, third = (Stage(name, lambda J, peaks, k=k: J[k]) for k, name in ((1, "second"), (2, "third")))
     J = rows((1.0, 2.0, 0.0), (1.0 + 1e-10, 1.0, 5.0), (2.0, 0.0, 0.0), (1.0, 1.0 + 1e-10, 4.0))
     assert ordered([FREE, second, third], J) == [3, 1, 0, 2]
@@ -117,27 +108,16 @@ def test_later_stages_tell_apart_what_is_as_good_as_the_best() -> None:
     assert ordered([FREE, second], rows((0.0, 1.0, 0.0), (0.009, 0.0, 0.0)), same=1e-2) == [1, 0]
     assert ordered([FREE, second], rows((0.0, 1.0, 0.0), (0.011, 0.0, 0.0)), same=1e-2) == [0, 1]
     assert ordered([FREE, second], rows((-100.0, 1.0, 0.0), (-99.5, 0.0, 0.0)), same=1e-2) == [1, 0]
-
-
-def test_a_stage_that_follows_on_zero_follows_nowhere_else() -> None:
     missing = Stage("missing", lambda J, peaks: J[0])
     rest = Stage("rest", lambda J, peaks: J[1], after_zero=True)
     order, values = ordering([missing, rest], rows((0.0, 3.0), (1e-10, 2.0), (1.0, 0.0), (1.0, -1.0)), np.zeros(4))
     assert values[:, 1].tolist() == pytest.approx([3.0, 2.0, np.nan, np.nan], nan_ok=True) and order.tolist() == [1, 0, 2, 3]
-
-
-def test_ties_are_told_apart_by_what_is_given_or_keep_their_places() -> None:
     J = rows((1.0,), (1.0,), (0.0,), (1.0,))
     assert ordered([FREE], J) == [2, 0, 1, 3]
     assert ordered([FREE], J, tie=np.array([2.0, 1.0, 9.0, 0.0])) == [2, 3, 1, 0]
     # The last stage tells all differences: there is no slack in it.
     assert ordered([FREE], rows((1.0,), (1.0 - 1e-12,)), tie=np.array([0.0, 1.0]), same=1.0) == [1, 0]
     assert ordered([FREE], rows((1.0,))) == [0] and ordered([FREE], np.zeros((0, 1))) == []
-
-
-def test_what_has_no_value_comes_last_and_keeps_its_places() -> None:
-    limited = Stage("limited", lambda J, peaks: J[0], limits=lambda J: [J[1]])
-    assert ordered([limited, FREE], rows((1.0, np.nan), (0.0, np.inf), (2.0, 0.0), (0.0, 0.5), (1.0, 0.5))) == [2, 3, 4, 0, 1]
 
 
 # A preference that a user writes
@@ -165,9 +145,6 @@ def test_the_best_is_the_least_effort_within_the_time() -> None:
     ranking = Quick(2.6).rank(cart(3))
     assert ranking.best.objectives["time"] == pytest.approx(2.6) and ranking.message == ""
     assert ranking.values[ranking.order].tolist() == pytest.approx([12 / 2.6**3, 12 / 1.2**3, np.inf])
-
-
-def test_limits_without_names_are_told_by_their_numbers_where_no_point_meets_them() -> None:
     ranking = Quick(1.0).rank(cart(3))
     assert ranking.message == "No point meets all hard limits; none has limit 1 of effort."
     assert ranking.best.objectives["time"] == pytest.approx(1.2)
@@ -217,10 +194,7 @@ def test_only_limits_in_conflict_are_named_and_what_the_nearest_misses() -> None
     )
     words = conflict_message(stage, (TIME, MASS), np.array([3.99, 7.0]))
     assert "meets all of: mass at most 5, mass at most 5.5;" in words and "'time at most 3 s' is missed by 0.99 s" in words
-
-
-@pytest.mark.parametrize(("J", "name"), [((9.0, 0.0), "short"), ((0.0, 9.0), "light")])
-def test_a_single_limit_is_named_alone(J: tuple[float, float], name: str) -> None:
-    words = conflict_message(limited((0, 3.0, "short"), (1, 5.0, "light")), (TIME, MASS), np.array(J))
-    assert words.startswith(f"no point was found that meets {name}; the nearest has time {J[0]:g} s, mass {J[1]:g}: '{name}' is missed by")
-    assert "all of" not in words
+    # A single one is named alone.
+    for J, name in (((9.0, 0.0), "short"), ((0.0, 9.0), "light")):
+        words = conflict_message(limited((0, 3.0, "short"), (1, 5.0, "light")), (TIME, MASS), np.array(J))
+        assert words.startswith(f"no point was found that meets {name}; the nearest has time {J[0]:g} s, mass {J[1]:g}: '{name}' is missed")
