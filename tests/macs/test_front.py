@@ -17,27 +17,27 @@ from macs.pareto.dominance import nondominated
 from problems.compiled import Variable
 
 
-def test_a_front_is_sorted_by_its_first_objective_in_the_users_value():
+def test_a_front_is_sorted_by_its_first_objective_with_all_its_columns_which_are_read_only():
     front = flights(6, F=[[3, -1], [1, -5], [2, -3], [6, -9], [5, -8], [4, -2]])
     assert front.objectives[:, 0].tolist() == [1, 2, 3, 4, 5, 6]
     assert front.objectives[:, 1].tolist() == [5, 3, 1, 2, 8, 9]
     assert np.array_equal(front.F, front.objectives * [1, -1])
     assert front.names == ("time", "height") and front.units == ("s", "km") and front.senses == ("minimize", "maximize")
-
-
-def test_payoff_order_is_kept_and_nan_sorts_last():
     F = [[3.0, 0.0], [np.nan, np.nan], [1.0, 0.0]]
     assert flights(3, F=F, sort=False).F[:, 0].tolist()[::2] == [3, 1]
     assert np.isnan(flights(3, F=F).F[2, 0])
-
-
-def test_every_column_follows_the_sorting():
     front = flights(
         3, F=[[3, 0], [1, 0], [2, 0]], violation=[0.3, 0.1, 0.2], status=["c", "a", "b"], excursions=[{"u": 3}, {"u": 1}, {"u": 2}]
     )
     assert [p.violation for p in front] == [0.1, 0.2, 0.3]
     assert [p.status for p in front] == ["a", "b", "c"]
     assert [p.excursions for p in front] == [{"u": 1}, {"u": 2}, {"u": 3}]
+    front = flights()
+    for array in (front.F, front.decision, front.violation, front[0].decision):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+    with pytest.raises(ValueError, match="violation has 2 entries, F has 5 rows"):
+        flights(5, violation=[0, 0])
 
 
 def test_indexing_gives_points_and_fronts():
@@ -62,28 +62,11 @@ def test_a_point_of_a_trajectory_front():
     assert point.optimality is None and flights(1, optimality=[1e-9])[0].optimality == 1e-9
     assert np.array_equal(point.alone().F, point.F[None])
     assert "time" in repr(point)
-
-
-def test_results_cannot_be_overwritten_by_accident():
-    front = flights()
-    for array in (front.F, front.decision, front.violation, front[0].decision):
-        with pytest.raises(ValueError, match="read-only"):
-            array[...] = 0
-
-
-def test_a_black_box_has_no_trajectory_and_its_errors_name_the_reason():
     point = black_box()[0]
     assert point.trajectory is None and point.excursions is None
     assert point.parameters.keys() == {"span", "chord", "twist"}
     with pytest.raises(ValueError, match="black box"):
         point.simulate()
-
-
-def test_a_problem_that_changed_is_not_simulated(monkeypatch):
-    monkeypatch.setattr("problems.load", lambda name, **data: state_problem(speed=4.0))
-    front = flights(problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", trusted=True))
-    with pytest.raises(ValueError, match="belongs to problem 'two legs'"):
-        front[0].simulate()
 
 
 def test_the_problem_is_found_by_its_address_once(monkeypatch):
@@ -93,9 +76,13 @@ def test_the_problem_is_found_by_its_address_once(monkeypatch):
     assert front.problem is None
     assert front.compiled() is front.compiled()
     assert calls == [("two_legs", {"a": 1})]
+    monkeypatch.setattr("problems.load", lambda name, **data: state_problem(speed=4.0))
+    front = flights(problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", trusted=True))
+    with pytest.raises(ValueError, match="belongs to problem 'two legs'"):
+        front[0].simulate()
 
 
-def test_an_empty_front_has_a_message_and_the_closest_point():
+def test_empty_fronts_have_a_message_and_the_closest_point_also_merged():
     front = empty()
     assert len(front) == 0 and front.F.shape == (0, 2) and front.objectives.shape == (0, 2)
     assert front.closest.violation == 0.25
@@ -103,18 +90,13 @@ def test_an_empty_front_has_a_message_and_the_closest_point():
     assert "no feasible point" in text and "climb.load" in text and "2.5e-01" in text
     with pytest.raises(IndexError, match=r"climb\.load"):
         front[0]
-
-
-def test_stats_are_always_whole():
+    merged = Front.merge([empty(closest=flights(1, violation=[0.5])[0], message="far"), empty()])
+    assert len(merged) == 0 and merged.closest.violation == 0.25 and "climb.load" in merged.message
+    assert Front.merge([black_box(0), black_box(0)]).closest is None
     stats = Front(F=np.empty((0, 2)), decision=[], violation=[], status=[], goals=compiled().goals).stats
     keys = ["evaluations", "inner_iterations", "gradient_solves", "failures", "wall_time", "seed", "tolerance", "versions", "reproducible"]
     assert set(keys) <= set(stats)
     assert {"python", "numpy", "casadi"} <= set(stats["versions"])
-
-
-def test_columns_of_wrong_length_are_named():
-    with pytest.raises(ValueError, match="violation has 2 entries, F has 5 rows"):
-        flights(5, violation=[0, 0])
 
 
 # Merging
@@ -127,9 +109,6 @@ def test_merging_keeps_what_nothing_dominates():
     expected = F[nondominated(F)]
     assert np.array_equal(merged.F, expected[np.argsort(expected[:, 0])])
     assert merged[0].trajectory is not None and merged.problem is compiled()
-
-
-def test_merging_sums_what_was_spent():
     merged = Front.merge([flights(3, stats={"evaluations": 10, "failures": {"failed": 1}, "seed": 4, "wall_time": 1.0, "tolerance": 1e-6}),
                           flights(3, 1, stats={"evaluations": 32, "failures": {"failed": 2, "infeasible": 1}, "seed": 5, "wall_time": 0.5,
                                                "tolerance": 1e-8, "reproducible": False})])  # fmt: skip
@@ -137,12 +116,6 @@ def test_merging_sums_what_was_spent():
     assert merged.stats["failures"] == {"failed": 3, "infeasible": 1}
     assert merged.stats["seed"] == [4, 5] and merged.stats["tolerance"] == 1e-6 and merged.stats["reproducible"] is False
     assert Front.merge([merged, merged]).stats["seed"] == [4, 5, 4, 5]
-
-
-def test_merging_only_empty_fronts_keeps_the_closest():
-    merged = Front.merge([empty(closest=flights(1, violation=[0.5])[0], message="far"), empty()])
-    assert len(merged) == 0 and merged.closest.violation == 0.25 and "climb.load" in merged.message
-    assert Front.merge([black_box(0), black_box(0)]).closest is None
 
 
 def test_points_of_different_meshes_merge_and_keep_their_own():
@@ -192,9 +165,6 @@ def test_a_table_has_a_row_for_each_point_and_warnings():
     assert max(map(len, lines)) < 140 and all(line == line.rstrip() for line in lines)
     with pytest.raises(ValueError, match="'bound' has 2 entries"):
         front.table({"bound": [0, 1]})
-
-
-def test_tables_say_which_objectives_are_not_in_conflict():
     front = black_box(4)
     assert "conflict" not in front.table()
     same = front.replace(F=np.column_stack([front.F[:, 0], np.full(len(front), 2.9) + 1e-9 * np.arange(len(front))]))
@@ -216,9 +186,6 @@ def test_numbers_show_what_differs():
     assert numbers([np.inf, 5.35104, np.nan]) == ["inf", "5.35104", "nan"], "what is no number has no digits"
     assert numbers([-0.0, 0.0]) == ["0.00000", "0.00000"]
     assert numbers([1e-9, 2e-9]) == ["1.00000e-09", "2.00000e-09"]
-
-
-def test_durations_in_words():
     assert [duration(s) for s in (0.0123, 3.61, 59.7, 61, 7384)] == ["0.012 s", "3.6 s", "60 s", "1 min 01 s", "2 h 03 min"]
 
 

@@ -181,9 +181,16 @@ def test_saving_replaces_a_front_while_another_is_read_from_it(tmp_path):
     front = Front.load(path)
     flights(3).save(path)
     assert len(front) == 2 and len(Front.load(path)) == 3
+    (tmp_path / "real").mkdir()
+    link = tmp_path / "link.nc"
+    link.symlink_to(tmp_path / "real" / "front.nc")
+    for n in (1, 2):
+        flights(n).save(link)
+        assert link.is_symlink() and len(Front.load(tmp_path / "real" / "front.nc")) == n
+    assert [path.name for path in (tmp_path / "real").iterdir()] == ["front.nc"]
 
 
-def test_a_missing_folder_or_file_is_named(tmp_path):
+def test_a_missing_folder_or_file_is_named(tmp_path, monkeypatch):
     with pytest.raises(FileNotFoundError, match=r"there is no file '.*nothing\.nc'"):
         Front.load(tmp_path / "nothing.nc")
     with pytest.raises(FileNotFoundError, match=r"cannot write '.*front\.nc': there is no folder '.*nowhere'"):
@@ -192,9 +199,14 @@ def test_a_missing_folder_or_file_is_named(tmp_path):
         flights(1).save(tmp_path)
     with pytest.raises(FileNotFoundError, match="there is no folder"):
         flights(1).to_csv(tmp_path / "nowhere" / "front.csv")
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(FileNotFoundError, match=r"cannot write 'front\.nc': the working folder is no longer there"):
+        flights(1).save("front.nc")
 
 
-def test_a_file_that_is_replaced_keeps_its_permissions_owner_and_group(tmp_path):
+def test_a_file_that_is_replaced_keeps_its_permissions_owner_and_group(tmp_path, monkeypatch):
     path, root = tmp_path / "front.nc", hasattr(os, "geteuid") and os.geteuid() == 0  # only root gives files away
     flights(1).save(path)
     if root:
@@ -204,9 +216,6 @@ def test_a_file_that_is_replaced_keeps_its_permissions_owner_and_group(tmp_path)
     found = path.stat()
     assert found.st_mode & 0o777 == 0o640 and len(Front.load(path)) == 2
     assert not root or (found.st_uid, found.st_gid) == (4321, 1234)
-
-
-def test_a_file_is_never_readable_by_more_than_the_one_that_it_replaces(tmp_path, monkeypatch):
     path, modes = tmp_path / "front.nc", []
     flights(1).save(path)
     path.chmod(0o600)
@@ -214,24 +223,6 @@ def test_a_file_is_never_readable_by_more_than_the_one_that_it_replaces(tmp_path
     monkeypatch.setattr("os.fsync", lambda number: (modes.append(os.fstat(number).st_mode & 0o777), sync(number)))
     flights(2).save(path)
     assert modes == [0o600]
-
-
-def test_a_working_folder_that_is_gone_is_one_error(tmp_path, monkeypatch):
-    (tmp_path / "gone").mkdir()
-    monkeypatch.chdir(tmp_path / "gone")
-    (tmp_path / "gone").rmdir()
-    with pytest.raises(FileNotFoundError, match=r"cannot write 'front\.nc': the working folder is no longer there"):
-        flights(1).save("front.nc")
-
-
-def test_a_symbolic_link_stays_and_its_target_is_replaced(tmp_path):
-    (tmp_path / "real").mkdir()
-    link = tmp_path / "front.nc"
-    link.symlink_to(tmp_path / "real" / "front.nc")
-    for n in (1, 2):
-        flights(n).save(link)
-        assert link.is_symlink() and len(Front.load(tmp_path / "real" / "front.nc")) == n
-    assert [path.name for path in (tmp_path / "real").iterdir()] == ["front.nc"]
 
 
 def test_a_name_that_cannot_be_written_is_found_before_any_work(tmp_path, monkeypatch):
@@ -347,14 +338,11 @@ def test_an_older_format_is_not_believed_with_a_checksum_nor_this_one_without(tm
             Front.load(tmp_path / "front.nc")
 
 
-@pytest.mark.parametrize("content", [b"hello\n", b"\x80\x04K\x01.", pickle.dumps({"F": 1}), b"CDF\x01\0\0\0\0", b"PK\3\4"])
-def test_files_of_other_kinds_are_refused(tmp_path, content):
-    (tmp_path / "front.nc").write_bytes(content)
-    with pytest.raises(ValueError, match="it is not a netCDF-4 file"):
-        Front.load(tmp_path / "front.nc")
-
-
-def test_foreign_netcdf_is_refused(tmp_path):
+def test_files_of_other_kinds_are_refused(tmp_path):
+    for content in (b"hello\n", b"\x80\x04K\x01.", pickle.dumps({"F": 1}), b"CDF\x01\0\0\0\0", b"PK\3\4"):
+        (tmp_path / "front.nc").write_bytes(content)
+        with pytest.raises(ValueError, match="it is not a netCDF-4 file"):
+            Front.load(tmp_path / "front.nc")
     xarray.Dataset({"objectives": (("point",), [1.0])}).to_netcdf(tmp_path / "front.nc", engine="h5netcdf")
     with pytest.raises(ValueError, match="a netCDF file of something else"):
         Front.load(tmp_path / "front.nc")
@@ -547,14 +535,6 @@ def test_forged_files_are_refused_in_one_line(tmp_path, name):
 # The problem
 
 
-def test_opening_a_file_runs_no_code(tmp_path, monkeypatch):
-    monkeypatch.setattr("problems.load", lambda *_, **__: pytest.fail("the problem was loaded"))
-    flights(2, problem=ProblemSource("two legs", compiled().fingerprint, "two_legs")).save(tmp_path / "front.nc")
-    front = Front.load(tmp_path / "front.nc")
-    front.table()
-    assert front.problem is None
-
-
 def save_with(path: Path, address: str, **data) -> None:
     flights(1, problem=ProblemSource("two legs", compiled().fingerprint, address, data)).save(path)
 
@@ -575,13 +555,6 @@ def test_an_address_in_a_file_is_not_run_unasked(tmp_path, monkeypatch):
     Front.load(path, trust=True)[0].simulate()
 
 
-def test_a_problem_of_the_catalogue_is_loaded_by_itself(tmp_path):
-    for address in ("goddard", "problems.cases.goddard:problem"):
-        save_with(tmp_path / "front.nc", address)
-        with pytest.raises(ValueError, match=r"the front belongs to problem 'two legs' \(.*\), not to 'goddard'"):
-            Front.load(tmp_path / "front.nc").compiled()
-
-
 @pytest.mark.parametrize("trust", [False, True])
 @pytest.mark.parametrize("address", ["os:system", "subprocess:getoutput", "posix:system", "os.path:os.system"])
 def test_a_forged_address_runs_nothing(tmp_path, address, trust):
@@ -594,12 +567,7 @@ def test_a_forged_address_runs_nothing(tmp_path, address, trust):
     assert not marker.exists()
 
 
-def test_the_closest_point_has_the_problem_of_its_front(tmp_path):
-    empty().save(tmp_path / "front.nc")
-    assert Front.load(tmp_path / "front.nc", compiled()).closest.simulate().trajectory is not None
-
-
-def test_a_front_takes_its_own_problem_and_no_other(tmp_path):
+def test_a_front_takes_its_own_problem_or_one_of_the_catalogue(tmp_path):
     path = tmp_path / "front.nc"
     flights(2).save(path)
     assert Front.load(path, problem=state_problem()).problem.name == "two legs"
@@ -609,6 +577,12 @@ def test_a_front_takes_its_own_problem_and_no_other(tmp_path):
     black_box().save(path)
     with pytest.raises(ValueError, match="black box"):
         Front.load(path, problem=compiled())
+    empty().save(tmp_path / "front.nc")
+    assert Front.load(tmp_path / "front.nc", compiled()).closest.simulate().trajectory is not None
+    for address in ("goddard", "problems.cases.goddard:problem"):
+        save_with(tmp_path / "front.nc", address)
+        with pytest.raises(ValueError, match=r"the front belongs to problem 'two legs' \(.*\), not to 'goddard'"):
+            Front.load(tmp_path / "front.nc").compiled()
 
 
 # Tables of values
@@ -626,7 +600,7 @@ def floats(rows: list[list[str]], first: int, end: int) -> np.ndarray:
     return np.array([[float(cell) for cell in row[first:end]] for row in rows])
 
 
-def test_csv_names_units_and_keeps_every_bit(tmp_path):
+def test_csv_of_fronts_has_units_every_bit_and_what_a_simulation_found(tmp_path):
     front = flights(3)
     front.to_csv(tmp_path / "front.csv")
     head, rows = table(tmp_path / "front.csv")
@@ -635,9 +609,6 @@ def test_csv_names_units_and_keeps_every_bit(tmp_path):
     assert same(floats(rows, 1, 3), front.objectives)
     ends = [[t for phase in point.trajectory.phases for t in (phase.t0, phase.tf)] for point in front]
     assert same(floats(rows, 5, 10), np.column_stack([[point.parameters["mass"] for point in front], ends]))
-
-
-def test_csv_has_what_a_simulation_found(tmp_path):
     front = marked(flights(3), [True, False, False], [True, True, False])
     front.to_csv(tmp_path / "front.csv")
     head, rows = table(tmp_path / "front.csv")
@@ -645,9 +616,6 @@ def test_csv_has_what_a_simulation_found(tmp_path):
     assert [row[3] for row in rows] == ["yes", "no", ""] and [row[11] for row in rows] == ["1e-05", "1e-05", ""]
     assert same(floats(rows[:2], 12, 14), 1.01 * front.objectives[:2])
     assert rows[2][11:] == [""] * 4 and [row[14] for row in rows[:2]] == ["1e-06"] * 2
-
-
-def test_csv_of_points_without_trajectories(tmp_path):
     front = black_box(3)
     front.to_csv(tmp_path / "front.csv")
     head, rows = table(tmp_path / "front.csv")

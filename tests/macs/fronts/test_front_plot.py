@@ -10,11 +10,12 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from synthetic_fronts import black_box, costated, empty, flights, marked
 
 from macs.fronts.pictures.flight_plot import _dense
-from macs.fronts.pictures.style import axis_label, axis_number, blank_figure, draw_limits
+from macs.fronts.pictures.style import COLORS, axis_label, axis_number, blank_figure, draw_limits
 from problems.compiled import Objective, Variable
 
 
@@ -44,12 +45,23 @@ def test_every_front_can_be_drawn(front):
     assert draw(ax.figure).startswith(b"\x89PNG")
 
 
-def test_axes_are_labelled_with_units_and_senses():
+def test_axes_have_units_and_senses_the_numbers_of_the_table_and_a_style_that_does_not_leak():
     ax = flights().plot()
     assert ax.get_xlabel() == "\N{LEFTWARDS ARROW} time [s]" and ax.get_ylabel() == "height [km] \N{RIGHTWARDS ARROW}"
     assert "best height" in ax.get_legend().get_texts()[1].get_text()
     offsets = ax.collections[0].get_offsets()
     assert np.array_equal(offsets, flights().objectives)
+    front = black_box(3, 2, F=np.array([[5.35104, 700.0], [67069.2, 300.0], [835267.4, 12.0142]]))
+    ax, table = front.plot(), front.table()
+    for value in ("5.3510", "835267"):
+        assert value in table.split()
+    assert [text.get_text().split(" (")[0] for text in ax.get_legend().get_texts()] == ["best f0: 5.3510 kg", "best f1: 12.014"]
+    before = dict(matplotlib.rcParams)
+    ax = blank_figure().add_subplot()
+    assert flights().plot(ax=ax) is ax
+    space = blank_figure().add_subplot(projection="3d")
+    assert black_box(5, 3).plot(space) is space and space.get_zlabel()
+    assert {k: v for k, v in matplotlib.rcParams.items() if before[k] != v} == {}
 
 
 def told(ax) -> dict[str, np.ndarray]:
@@ -115,15 +127,6 @@ def test_long_names_and_messages_stay_within_the_picture():
     assert nothing.bbox.x0 <= message.x0 and message.x1 <= nothing.bbox.x1
 
 
-def test_given_axes_are_used_and_style_does_not_leak():
-    before = dict(matplotlib.rcParams)
-    ax = blank_figure().add_subplot()
-    assert flights().plot(ax=ax) is ax
-    space = blank_figure().add_subplot(projection="3d")
-    assert black_box(5, 3).plot(space) is space and space.get_zlabel()
-    assert {k: v for k, v in matplotlib.rcParams.items() if before[k] != v} == {}
-
-
 @pytest.mark.parametrize("length", [-3.7e-6, 2e-6])
 def test_a_phase_without_length_has_no_costates_and_the_picture_says_so(length):
     *_, costate, hamiltonian = axes = costated(length)[1].plot(costates=True)
@@ -144,15 +147,6 @@ def test_a_path_instead_of_a_figure_is_refused_with_the_remedy(tmp_path):
                  lambda: box.plot_variables(Path("x.png")), lambda: box[2].plot("x.png")):  # fmt: skip
         with pytest.raises(ValueError, match=r"drawn into a figure, not into a file: .* front\.plot\(\)\.figure\.savefig\('x\.png'\)"):
             call()
-
-
-def test_controls_jump_where_their_polynomials_do():
-    control = flights()[0].trajectory["climb"].control
-    times, values = _dense(control.edges, control.on_element, 0, None)
-    assert np.isnan(values).sum() == len(control.edges) - 1
-    first = values[: np.flatnonzero(np.isnan(values))[0]]
-    assert first[-1] == pytest.approx(control.on_element(0, np.array([1.0]))[0, 0])
-    assert times[np.flatnonzero(np.isnan(values))[0] + 1] == control.edges[1]
 
 
 @pytest.mark.slow
@@ -210,6 +204,12 @@ def test_limits_of_paths_are_drawn_over_their_own_phase():
     dashed = [line for line in ax.lines if line.get_linestyle() == "--"]
     assert len(dashed) == 1 and set(dashed[0].get_ydata()) == {2.0}
     assert list(dashed[0].get_xdata()) == [flight.trajectory["climb"].t0, flight.trajectory["climb"].tf]
+    control = flights()[0].trajectory["climb"].control
+    times, values = _dense(control.edges, control.on_element, 0, None)
+    assert np.isnan(values).sum() == len(control.edges) - 1
+    first = values[: np.flatnonzero(np.isnan(values))[0]]
+    assert first[-1] == pytest.approx(control.on_element(0, np.array([1.0]))[0, 0])
+    assert times[np.flatnonzero(np.isnan(values))[0] + 1] == control.edges[1]
 
 
 def test_trajectories_that_are_not_verified_say_so_and_have_hollow_nodes():
@@ -247,16 +247,7 @@ def test_long_labels_stay_beside_their_panels():
 
 @pytest.mark.parametrize(
     ("unit", "shown"),
-    [
-        ("m2/s3", "m²/s³"),
-        ("1/m2", "1/m²"),
-        ("N^2 s", "N² s"),
-        ("N2 m2 s", "N² m² s"),
-        ("t N2", "t N2"),
-        ("t CO2", "t CO2"),
-        ("m s^-2", "m s⁻²"),
-        ("%", "%"),
-    ],
+    [("m2/s3", "m²/s³"), ("1/m2", "1/m²"), ("N^2 s", "N² s"), ("N2 m2 s", "N² m² s"), ("t N2", "t N2"), ("m s^-2", "m s⁻²"), ("%", "%")],
 )
 def test_powers_of_units_are_raised(unit, shown):
     assert axis_label("x", unit).replace("\N{NO-BREAK SPACE}", " ") == f"x [{shown}]"
@@ -265,14 +256,6 @@ def test_powers_of_units_are_raised(unit, shown):
 def test_numbers_beside_axes_have_no_powers_of_ten_below_ten_millions():
     values = (17344.2, -0.5, 1234.5, 999999.0, 1.5e6, 2e7, -3e-5)
     assert [axis_number(value) for value in values] == ["17344", "−0.5", "1234", "999999", "1500000", "2×10⁷", "−3×10⁻⁵"]
-
-
-def test_legend_and_table_have_the_same_numbers():
-    front = black_box(3, 2, F=np.array([[5.35104, 700.0], [67069.2, 300.0], [835267.4, 12.0142]]))
-    ax, table = front.plot(), front.table()
-    for value in ("5.3510", "835267"):
-        assert value in table.split()
-    assert [text.get_text().split(" (")[0] for text in ax.get_legend().get_texts()] == ["best f0: 5.3510 kg", "best f1: 12.014"]
 
 
 def test_round_off_of_a_constant_objective_is_no_picture():
@@ -285,3 +268,82 @@ def test_round_off_of_a_constant_objective_is_no_picture():
     assert ax.get_ylim() == pytest.approx((2.61, 3.19))
     lines = black_box(4, 4, F=np.column_stack([np.arange(4.0), noise, np.arange(4.0), -np.arange(4.0)])).plot().lines
     assert {line.get_ydata()[1] for line in lines if len(line.get_ydata()) == 4} == {1.0}
+
+
+# A few trajectories of a front, and the marks of the same points among its objectives
+
+
+def test_a_color_for_each_trajectory_in_every_panel():
+    front = flights(5)
+    axes = front.plot_trajectories([0, 4])
+    assert [ax.get_ylabel() for ax in axes] == ["h [km]", "v [km/s]", "u [km/s²]", "load [km²/s³]"]
+    for ax in axes:
+        assert {to_hex(line.get_color()).upper() for line in ax.lines if line.get_linestyle() == "-"} == set(COLORS[:2])
+    figure = axes[0].figure
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert [text[:3] for text in words] == ["#0:", "#4:"] and "time" in words[0] and "height" in words[0]
+    ends = [max(phase.tf for phase in front[i].trajectory.phases) for i in (0, 4)]
+    assert axes[0].get_xlim()[1] >= max(ends)
+    drawn = [line.get_xdata() for line in axes[0].lines if line.get_linestyle() == "-"]
+    assert np.isclose(np.nanmax(np.concatenate(drawn)), max(ends))
+
+
+def test_dots_are_ends_of_phases_and_hollow_nodes_of_what_is_not_verified():
+    axes = marked(flights(3), [True, False, True]).plot_trajectories([0, 1])
+    dots = [line for line in axes[0].lines if line.get_marker() == "o"]
+    full = [line for line in dots if to_hex(line.get_markerfacecolor()) != "#ffffff"]
+    hollow = [line for line in dots if line not in full]
+    assert len(full) == 2 and all(len(line.get_xdata()) == 1 for line in full)
+    assert hollow and {to_hex(line.get_color()).upper() for line in hollow} == {COLORS[1]}
+    words = [text.get_text() for text in axes[0].figure.legends[0].get_texts()]
+    assert "not verified" not in words[0] and words[1].endswith("not verified")
+    # What was not simulated is said, but drawn in full, as by a point's own picture.
+    axes = flights(3).plot_trajectories([0, 1])
+    assert all(to_hex(line.get_markerfacecolor()) != "#ffffff" for line in axes[0].lines if line.get_marker() == "o")
+    assert all(text.get_text().endswith("not simulated") for text in axes[0].figure.legends[0].get_texts())
+
+
+@pytest.mark.parametrize(
+    ("front", "points", "said"), [(flights(3), [], "one to"), (flights(9), range(8), "one to"), (black_box(), [2], "2 has no")]
+)
+def test_what_cannot_be_drawn_is_said(front, points, said):
+    with pytest.raises(ValueError, match=said):
+        front.plot_trajectories(points)
+    with pytest.raises(ValueError, match="at most 7"):
+        flights(9).plot(marked=range(8))
+
+
+@pytest.mark.parametrize("objectives", [2, 4])
+def test_marked_points_have_the_colors_of_their_trajectories(objectives):
+    front = black_box(6, objectives)
+    ax = front.plot(marked=[1, -1])
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert [text[:3] for text in words] == ["#1:", "#5:"]
+    if objectives == 4:
+        drawn = [line for line in ax.lines if line.get_label() in words]
+        assert [to_hex(line.get_color()).upper() for line in drawn] == list(COLORS[:2])
+    else:
+        drawn = [one for one in ax.collections if one.get_label() in words]
+        assert [to_hex(one.get_edgecolor()[0]).upper() for one in drawn] == list(COLORS[:2])
+        assert np.array_equal(drawn[1].get_offsets()[0][-1], front.objectives[-1, min(objectives - 1, 1)])
+
+
+def test_other_points_are_drawn_beside_those_of_two_objectives():
+    front = black_box(6, 2)
+    many, few = np.random.default_rng(0).uniform(size=(101, 2)), front.objectives[:3] + 0.1
+    ax = front.plot(beside={"known": many, "another": few})
+    assert [text.get_text() for text in ax.get_legend().get_texts()[:2]] == ["known", "another"]
+    drawn = {line.get_marker(): np.column_stack(line.get_data()) for line in ax.lines if len(line.get_xdata())}
+    assert np.array_equal(drawn["o"], many) and np.array_equal(drawn["x"], few)
+    with pytest.raises(ValueError, match="two objectives, not of 3"):
+        black_box(6, 3).plot(beside={"known": many})
+
+
+@pytest.mark.slow
+def test_a_shorter_trajectory_is_above_a_longer_one():
+    front = flights(5)
+    ends = [point.trajectory.phases[-1].tf for point in front]
+    short, long = int(np.argmin(ends)), int(np.argmax(ends))
+    ax = front.plot_trajectories([short, long])[0]
+    lines = [to_hex(line.get_color()).upper() for line in ax.lines if line.get_linestyle() == "-"]
+    assert lines.index(COLORS[1]) < lines.index(COLORS[0])

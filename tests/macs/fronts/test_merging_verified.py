@@ -79,9 +79,6 @@ def test_two_fronts_of_different_tolerances_are_judged_by_the_looser():
     merged = Front.merge([front(*one, [True]), loose, front(*two, [False], stats={})])
     assert merged.stats["verify"] == 1e-2 and len(merged) == 2
     assert "verify" not in Front.merge([front(*one, [False], stats={})]).stats
-
-
-def test_a_merged_front_has_a_table_with_the_marks():
     claims, actual = [[0.0, 0.0], [1.0, -1.0]], [[2.0, 2.0], [1.0, -1.0]]
     text = Front.merge([front(claims[:1], actual[:1], [False]), front(claims[1:], actual[1:], [True])]).table()
     assert "Not verified: simulated, these differ by more than 0.001." in text

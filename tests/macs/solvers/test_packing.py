@@ -130,9 +130,6 @@ def test_one_array_in_two_fields_comes_back_as_two() -> None:
     leaf = through_bytes(Leaf(array, 1.0, 1, True, "a", array), Leaf)
     leaf.array[:] = 1
     assert leaf.maybe is not None and not leaf.maybe.any()
-
-
-def test_scalars_of_numpy_come_back_as_pythons() -> None:
     leaf = Leaf(np.zeros(1), np.float64(0.1), np.int64(3), np.bool_(True), np.str_("a"))  # type: ignore[arg-type]
     assert_same(through_bytes(leaf, Leaf), Leaf(np.zeros(1), 0.1, 3, True, "a"))
 

@@ -28,9 +28,6 @@ def test_plain_lines_come_now_and_then_and_at_the_end():
     assert len(lines) == 4
     assert lines[0].startswith("0 / 10 000 evaluations, 0:00, archive 4")
     assert lines[-1] == "10 000 / 10 000 evaluations, 0:25, archive 4, flight time 109.1, speed 0.9, 3 infeasible"
-
-
-def test_nothing_is_written_twice_nor_of_nothing():
     stream = io.StringIO()
     with SearchDisplay(stream=stream):
         pass
@@ -38,6 +35,13 @@ def test_nothing_is_written_twice_nor_of_nothing():
     with SearchDisplay(stream=stream) as display:
         display.update(standing(archive=0))
     assert stream.getvalue() == "1 200 / 10 000 evaluations, 0:12, 1:28 left, no feasible point yet\n"
+    stream = io.StringIO()
+    with SearchDisplay(stream=stream) as display:
+        display.update(replace(standing(10_000), gradient_solves=31))
+    assert stream.getvalue().startswith("10 000 / 10 000 evaluations, 0:12, 31 gradient solves, archive 4")
+    assert [minutes(s) for s in (0, 59.6, 61, 7205)] == ["0:00", "1:00", "1:01", "2:00:05"]
+    assert clock(standing(0)) == "0:12" and clock(standing(5000)) == "0:12, 0:12 left" and clock(standing(10_000)) == "0:12"
+    assert count(standing()) == "1 200 / 10 000 evaluations"
 
 
 def test_a_terminal_sees_it_live():
@@ -47,16 +51,3 @@ def test_a_terminal_sees_it_live():
         time.sleep(0.3)
     shown = stream.getvalue()
     assert "1 200 / 10 000" in shown and "flight time 109.1" in shown and "2 failed" in shown
-
-
-def test_gradient_solves_go_on_after_the_last_evaluation():
-    stream = io.StringIO()
-    with SearchDisplay(stream=stream) as display:
-        display.update(replace(standing(10_000), gradient_solves=31))
-    assert stream.getvalue().startswith("10 000 / 10 000 evaluations, 0:12, 31 gradient solves, archive 4")
-
-
-def test_times_and_counts_in_words():
-    assert [minutes(s) for s in (0, 59.6, 61, 7205)] == ["0:00", "1:00", "1:01", "2:00:05"]
-    assert clock(standing(0)) == "0:12" and clock(standing(5000)) == "0:12, 0:12 left" and clock(standing(10_000)) == "0:12"
-    assert count(standing()) == "1 200 / 10 000 evaluations"

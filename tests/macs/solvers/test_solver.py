@@ -30,16 +30,6 @@ def test_settings_are_printed_as_the_call_that_makes_them() -> None:
         assert eval(repr(solver)) == solver and len(repr(solver)) < 100
 
 
-def test_nothing_to_decide() -> None:
-    problem = Problem("falling stone")
-    fall = problem.phase("fall", t0=0, tf=1)
-    height = fall.state("height", bounds=(-10, 10), initial=5)
-    fall.dynamics(height=-1)
-    problem.maximize("height", fall.final(height))
-    with pytest.raises(ValueError, match="'falling stone' leaves nothing to decide"):
-        MACS().solve(problem, MESH, evaluations=10)
-
-
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
@@ -62,16 +52,20 @@ def test_arguments_that_make_no_sense(wrong: dict, message: str) -> None:
         MACS().solve(load("orbit_rise"), MESH, **{"evaluations": 50, **wrong})
 
 
-def test_things_that_are_no_problem_or_transcription() -> None:
+def test_what_no_search_is_about_is_refused() -> None:
     with pytest.raises(ValueError, match="problem must be a Problem, not str"):
         MACS().solve("goddard", MESH, evaluations=50)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="transcription must be"):
         MACS().solve(load("goddard"), "dfet:4x6", evaluations=50)  # type: ignore[arg-type]
-
-
-def test_an_archive_smaller_than_the_objectives() -> None:
     with pytest.raises(ValueError, match="archive"):
         MACS(archive=1).solve(load("goddard"), MESH, evaluations=50)
+    problem = Problem("falling stone")
+    fall = problem.phase("fall", t0=0, tf=1)
+    height = fall.state("height", bounds=(-10, 10), initial=5)
+    fall.dynamics(height=-1)
+    problem.maximize("height", fall.final(height))
+    with pytest.raises(ValueError, match="'falling stone' leaves nothing to decide"):
+        MACS().solve(problem, MESH, evaluations=10)
 
 
 @pytest.mark.slow
@@ -95,6 +89,8 @@ def test_a_time_limit_keeps_what_was_found() -> None:
     assert front.stats["stopped"] == "time limit"
     assert not front.stats["reproducible"]
     assert len(front) > 0
+    front = MACS().solve(compiled("goddard"), MESH, evaluations=12, seed=1, inner=Ipopt(seconds=1e-6))
+    assert not front.stats["reproducible"]
 
 
 def test_the_first_population_of_a_hard_problem_may_be_cut_short(capsys) -> None:
@@ -188,11 +184,6 @@ def test_a_start_of_another_mesh_is_interpolated() -> None:
     assert (fine.F[:, 1].min() - coarse.F[:, 1].min()) < (bare.F[:, 1].min() - coarse.F[:, 1].min())
 
 
-def test_a_clock_makes_a_run_not_reproducible() -> None:
-    front = MACS().solve(compiled("goddard"), MESH, evaluations=12, seed=1, inner=Ipopt(seconds=1e-6))
-    assert not front.stats["reproducible"]
-
-
 def test_candidates_that_the_fast_inner_level_leaves_are_counted() -> None:
     problem = Problem("needle")
     phase = problem.phase("p", t0=0.0, tf=8.0)
@@ -207,13 +198,7 @@ def test_candidates_that_the_fast_inner_level_leaves_are_counted() -> None:
 
 @pytest.mark.parametrize(
     ("solver", "coarse"),
-    [
-        (MACS(), True),
-        (MACS(mesh="adaptive"), True),
-        (MACS(mesh="fixed"), False),
-        (MACS(refine=False), False),
-        (NSGA2(population=4), False),
-    ],
+    [(MACS(), True), (MACS(mesh="adaptive"), True), (MACS(mesh="fixed"), False), (MACS(refine=False), False), (NSGA2(population=4), False)],
 )
 def test_a_search_goes_on_the_coarse_mesh_where_its_points_are_solved_on_finer_ones(
     monkeypatch: pytest.MonkeyPatch, solver: Solver, coarse: bool
