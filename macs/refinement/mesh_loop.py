@@ -214,7 +214,7 @@ class MeshLoop:
 
     def refine(self, begun: OnMesh, task: Scalarised, others: Sequence[Trajectory] = (), hints: Sequence[Meshed] = ()) -> Refinement:
         """A point on meshes that simulations agree with, as far as the limits allow."""
-        found = Refinement(begun)
+        found, seen = Refinement(begun), [begun]
         present, history, waiting, detours = begun, [begun.verdict.error], list(hints), LOOP.detours
         least = _achieved(begun, task)
         while len(found.meshes) < self.limit and not self.ended:
@@ -239,6 +239,7 @@ class MeshLoop:
                 break
             least = min(least, _achieved(reached, task))
             present = reached
+            seen.append(present)
             if self.enough is not None and self.enough(present):
                 found.best = present
                 break
@@ -249,6 +250,12 @@ class MeshLoop:
             if len(history) > LOOP.patience and min(history[-LOOP.patience :]) > LOOP.progress * min(history[: -LOOP.patience]):
                 found.trouble = TROUBLES[CONVERGED]
                 break
+        if self.enough is None and not self._rank(found.best, task, least)[0]:
+            # Another mesh confirms it: of the meshes on which a simulation does so, too, and no less exactly, that on which it is best.
+            equal = [one for one in seen if one.achieved is not None and not one.verdict.complaints() and one.doubt <= found.best.doubt]
+            best, loss = min(equal, key=lambda one: task.loss(one.F), default=found.best), task.loss(found.best.F)
+            if task.loss(best.F) < loss - LOOP.slip * self.wanted.settled:
+                found.best = replace(best, change=loss - task.loss(best.F))
         beyond = task.loss(found.best.F) - least
         found.worse = beyond if beyond > self.wanted.settled else 0.0
         return found

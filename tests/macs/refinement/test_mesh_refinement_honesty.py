@@ -169,6 +169,21 @@ def test_what_is_worse_than_it_was_when_simulated_is_no_success():
     assert "it is worse by" in better.note and "when simulated" in better.note
 
 
+@pytest.mark.parametrize(("lost", "kept"), [(0.5, True), (0.01, False)], ids=["much", "hardly anything"])
+def test_a_finer_mesh_that_loses_something_confirms_the_point_and_does_not_replace_it(monkeypatch, lost: float, kept: bool):
+    loop, begun, task = begun_on(DFET(16, 5), layers(1.5, 1.0, 5.0, 50.0), Wanted(1e-2, 1e-2, 1e-2))
+    judged = loop.on_mesh
+
+    def worse(*arguments):
+        found, more = judged(*arguments), lost * loop.wanted.settled * task.units
+        return replace(found, F=begun.F + more, achieved=begun.F + more, doubt=begun.doubt)
+
+    monkeypatch.setattr(loop, "on_mesh", worse)
+    found = loop.refine(begun, task)
+    assert len(found.meshes) == 1 and found.complaints() == []
+    assert (found.best.method == begun.method) is kept and found.best.change <= 0.5 * loop.wanted.settled
+
+
 @pytest.mark.slow
 def test_a_control_of_low_order_gets_what_a_mixed_constraint_needs():
     """On 20 Bernstein elements of linear controls the mixed constraint of Rayleigh's problem costs 8e-4 of the objective."""
