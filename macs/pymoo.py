@@ -23,7 +23,6 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.initialization import Initialization
 from pymoo.core.population import Population
 from pymoo.core.termination import TerminateIfAll
-from pymoo.core.variable import Real
 from pymoo.termination.default import DefaultTermination
 from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
@@ -54,7 +53,7 @@ class MACS(Algorithm):
     """Multi-Agent Collaborative Search as an algorithm of pymoo, for any pymoo Problem of real variables.
 
     It is the search of `macs.MACS`: on a problem without constraints, the same settings, seed and number of evaluations give the points of
-    `macs.MACS(...).minimize(problem, evaluations=..., seed=...)`, to the last bit; with G, those of its `tolerance` near 0.
+    `macs.MACS(...).minimize(problem, evaluations=..., seed=...)`, to the last bit; with G, too.
 
     Parameters
     ----------
@@ -138,13 +137,13 @@ class MACS(Algorithm):
         for name in options:
             if name in SETTINGS and (name != "archive" or isinstance(options[name], int | np.integer)):
                 raise ValueError(f"{name} is a setting of the algorithm: MACS({name}={options[name]!r})")
-        _check_problem(problem)
+        compiled = plain_problem(problem)
         if isinstance(self, AdaptiveConstraintHandling):
             raise ValueError("MACS: what is feasible may not change during a run, as it does by AdaptiveEpsilonConstraintHandling")
         if self.output is None:
             self.output = SingleObjectiveOutput() if problem.n_obj == 1 else MultiObjectiveOutput()
         super().setup(problem, verbose=verbose, progress=progress, **options)
-        self._compiled = replace(plain_problem(problem), name=problem.name(), rows=_only_pymoo)
+        self._compiled = replace(compiled, name=problem.name(), rows=_only_pymoo, equalities=())  # pymoo says what is feasible
         self.search.check_objectives(problem.n_obj)
         self.search.check_goals(self._compiled.goals)
         self.search.check_vector(self._compiled)
@@ -346,19 +345,6 @@ def most_evaluations(termination: Any, default: bool = True) -> float:
     parts = (*getattr(termination, "criteria", ()), *getattr(termination, "terminations", ()))
     last = max if isinstance(termination, TerminateIfAll) else min
     return last((most_evaluations(part, default) for part in parts), default=math.inf)
-
-
-def _check_problem(problem: Any) -> None:
-    """Raise ValueError if not all variables of a pymoo problem are real."""
-    named = getattr(problem, "vars", None)
-    if named is not None:
-        kinds = ", ".join(sorted({type(one).__name__ for one in named.values()}))
-        found = f"variables by name ({kinds})"
-    elif problem.vtype is None or (isinstance(problem.vtype, type) and issubclass(problem.vtype, float | np.floating | Real)):
-        return
-    else:
-        found = f"variables of type {getattr(problem.vtype, '__name__', problem.vtype)}"
-    raise ValueError(f"MACS: problem {problem.name()} has {found}; it searches arrays of real variables only (vtype=float, xl, xu)")
 
 
 def _residuals(batch: Population) -> np.ndarray:

@@ -14,6 +14,8 @@ import numpy as np
 
 from .compiled import Limit, Variable
 
+COMPARISONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT}
+
 
 def new_name(kind: str, name: Any, taken: Iterable[str], place: str) -> str:
     """What messages call a new thing, whose name must be a non-empty string that is not among `taken`."""
@@ -144,6 +146,11 @@ def period(value: Any, bounds: tuple[float, float], what: str) -> float | None:
 
 def expression(value: Any, known: Collection[AbstractSet[int]], what: str, hint: str) -> ca.MX:
     """A scalar CasADi expression of known symbols only, which are given by sets of their hashes; plain numbers are expressions too."""
+    if isinstance(value, bool | np.bool_) or (isinstance(value, ca.MX) and _compares(value)):
+        raise ValueError(
+            f"{what} is a comparison, {shown(value)}, which is 1 where it holds and 0 elsewhere: for a limit, state what is on the left "
+            "as an expression and the limit as lower=... or upper=...; for a number that switches, write casadi.if_else(..., 1, 0)"
+        )
     if isinstance(value, ca.MX):
         if value.shape != (1, 1):
             raise ValueError(f"{what} must be a scalar, not of shape {value.shape}")
@@ -154,6 +161,13 @@ def expression(value: Any, known: Collection[AbstractSet[int]], what: str, hint:
             raise ValueError(f"{what} must be finite, not {float(value)}")
         return value
     return ca.MX(number(value, what))
+
+
+def _compares(value: ca.MX) -> bool:
+    """Whether an expression is a comparison or joins comparisons, times a sign or not."""
+    if value.is_constant() or value.n_dep() == 0:
+        return False
+    return value.op() in COMPARISONS or (value.op() == ca.OP_NEG and _compares(value.dep(0)))
 
 
 def guess(value: Any, what: str) -> Any:

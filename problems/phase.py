@@ -219,6 +219,11 @@ class Phase:
         """Symbols of this phase for objectives and constraints, in the order of `CompiledPhase.n_quantities`."""
         return [self.t0, self.tf, *(symbol for kind in _KINDS for symbol, _ in self._quantities[kind])]
 
+    def _constants(self) -> set[int]:
+        """Hashes of the values at the ends, and peaks, of constants."""
+        kinds = (kind for kind in _KINDS if kind != "integral")
+        return {symbol.__hash__() for kind in kinds for symbol, inner in self._quantities[kind] if not ca.symvar(inner)}
+
     def _labels(self) -> dict[str, list[str]]:
         """Labels of the rows of each compiled Function."""
         place = f"phase '{self.name}'"

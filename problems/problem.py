@@ -178,10 +178,10 @@ class Problem:
             raise ValueError(f"{place} has no phase")
         if not self._objectives:
             raise ValueError(f"{place} has no objective; add one with minimize or maximize")
-        # One alone may be: it asks for any feasible trajectory.
-        constant = [name for name, (_, expr) in self._objectives.items() if not ca.symvar(expr)]
-        if constant and len(self._objectives) > 1:
-            raise ValueError(f"objective '{constant[0]}' of {place} is a constant: there is nothing to trade for it")
+        fixed = set().union(*(phase._constants() for phase in self._phases.values()))
+        for name, (_, expr) in self._objectives.items():
+            if all(symbol.__hash__() in fixed for symbol in ca.symvar(expr)):
+                raise ValueError(f"objective '{name}' of {place} is a constant: no decision changes it")
         phases = list(self._phases.values())
         links = [Link(i, j, _common(phases[i], phases[j]) if states is None else states) for (i, j), states in self._links.items()]
         groups = {f"q{i}": phase._quantity_symbols() for i, phase in enumerate(phases)} | {"p": list(self._symbols.values())}

@@ -27,6 +27,8 @@ def without_dynamics(name: str) -> str:
 
 Outputs = Callable[[np.ndarray], Mapping[str, Any]]
 Kind = TypeVar("Kind", bound=Outputs)
+SAMPLED = 8
+"""Rows at which a function is evaluated to know it: few, since one may take long."""
 Rows = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """`rows(X: (n, d)) -> (objectives (n, m) in the user's senses, values (n, c) that the limits bound)`."""
 
@@ -58,11 +60,11 @@ class CompiledVectorProblem:
     goals : tuple of m Objectives
         Empty: as many as the function returns, all minimised, without names.
     limits : tuple of c Limits, or None
-        None: as many columns as the function returns, each at most 0, with a scale of 1.
+        None: as many columns as the function returns, each at most 0 in units of its own.
     rows : callable
         See `Rows`. A row with NaN is a failed evaluation.
     equalities : tuple of int
-        Without `limits`: columns that have to be 0, instead of at most 0.
+        Without `limits`: columns that have to be 0, instead of at most 0. Their residuals are divided by their `sizes`.
     address, data
         As of `CompiledProblem`.
 
@@ -111,19 +113,31 @@ class CompiledVectorProblem:
             raise ValueError(f"objectives: function returned {values.shape[1]}, {len(self.goals)} expected")
         F = values * self.signs if self.goals else values
         if self.limits is None:
-            equal = np.isin(np.arange(bounded.shape[1]), self.equalities)
-            return F, np.where(equal, bounded, np.maximum(bounded, 0.0))
+            residuals, equal = np.maximum(bounded, 0.0), list(self.equalities)
+            residuals[:, equal] = bounded[:, equal] / self.sizes if equal else 0.0
+            return F, residuals
         lower, upper, scale = (np.array([getattr(limit, side) for limit in self.limits]) for side in ("lower", "upper", "scale"))
         return F, (np.maximum(bounded - upper, 0.0) - np.maximum(lower - bounded, 0.0)) / scale
 
     @cached_property
-    def fingerprint(self) -> str:
-        """A hash of names, bounds, senses, limits, and of the function's values at fixed rows, to nine digits: two problems with the same
-        one are the same. The function is evaluated at eight rows for it, once."""
-        # Few rows, since one may take long.
+    def _sampled(self) -> tuple[np.ndarray, np.ndarray]:
+        """What `rows` returns at fixed rows, drawn from the box."""
         rng = np.random.default_rng(0)
         lower, upper = (np.array([getattr(v, side) for v in self.variables]) for side in ("lower", "upper"))
-        values = np.hstack(self.rows(rng.uniform(lower, upper, (8, len(lower)))))
+        return self.rows(rng.uniform(lower, upper, (SAMPLED, len(lower))))
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """Typical absolute value of each equality without limits, over the `SAMPLED` rows: what it may miss follows from its unit."""
+        found = np.abs(self._sampled[1][:, list(self.equalities)])
+        usual = [np.median(one[np.isfinite(one)]) if np.isfinite(one).any() else 0.0 for one in found.T]
+        return np.array([size or 1.0 for size in usual])
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """A hash of names, bounds, senses, limits, and of the function's values at fixed rows, to nine digits: two problems with the same
+        one are the same. The function is evaluated at `SAMPLED` rows for it, once."""
+        values = np.hstack(self._sampled)
         told = ("vector", self.name, self.variables, self.goals, self.limits, *([self.equalities] if self.equalities else []))
         digest = hashlib.sha256(repr(told).encode())
         digest.update(" ".join(f"{value + 0.0:.8e}" if math.isfinite(value) else "not finite" for value in values.ravel()).encode())

@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.checks import check_text, interval, shown
 from problems.compiled import Objective, Variable
-from problems.vector import CompiledVectorProblem, real_numbers
+from problems.vector import SAMPLED, CompiledVectorProblem, real_numbers
 from transcription.trajectories.limits import excess
 
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
@@ -19,6 +19,9 @@ from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evalua
 class BlackBox(Evaluator):
     """Evaluator of a vector problem. A point none of whose violations exceeds the tolerance is feasible.
 
+    Without limits, as of a plain function, G <= 0 is meant as it stands, whatever its unit, and only an equality has a tolerance, in its
+    `sizes`: to know these, `SAMPLED` rows are evaluated and counted.
+
     The number of objectives `m` is known from the problem, or from the first batch. Reading `m` before that costs one evaluation, of the
     centre of the box, which is counted. ValueError where the result of a function has the wrong type or shape; the message names it.
     """
@@ -26,12 +29,14 @@ class BlackBox(Evaluator):
     def __init__(self, problem: CompiledVectorProblem, tolerance: float = 1e-6) -> None:
         if not (isinstance(tolerance, int | float) and 0 <= tolerance < np.inf):
             raise ValueError(f"tolerance: must be a number >= 0, not {tolerance!r}")
-        self.problem, self.tolerance = problem, float(tolerance)
+        plain = problem.limits is None
+        self.problem, self.tolerance, self._missed = problem, 0.0 if plain else float(tolerance), float(tolerance)
+        self._equalities = list(problem.equalities) if plain else []
         self.m_known: int | None = len(problem.goals) or None
         self.lower, self.upper = (np.array([getattr(v, side) for v in problem.variables]) for side in ("lower", "upper"))
         self.period = np.array([v.period or 0.0 for v in problem.variables])
         self.free = np.arange(len(problem.variables))
-        self.counts = Counts()
+        self.counts = Counts(evaluations=SAMPLED if self._equalities else 0)
 
     @property
     def m(self) -> int:
@@ -67,6 +72,8 @@ class BlackBox(Evaluator):
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         F, residuals = self._values(Z)
         self.m_known = learned(self.m_known, F.shape[1], f"function returned {F.shape[1]}")
+        equal = residuals[:, self._equalities]
+        residuals[:, self._equalities] = np.copysign(np.maximum(np.abs(equal) - self._missed, 0.0), equal)
         violation = np.abs(residuals).max(axis=1, initial=0.0)
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))
         F[failed], violation[failed] = np.nan, np.inf
@@ -97,6 +104,7 @@ def plain_problem(
     m: int | None = None
     equalities: tuple[int, ...] = ()
     if is_pymoo(function):
+        _check_real(function)
         equalities = tuple(range(int(function.n_ieq_constr), int(function.n_ieq_constr + function.n_eq_constr)))
         bounds = _pymoo_bounds(function) if bounds is None else bounds
         m = int(function.n_obj)
@@ -211,6 +219,20 @@ def _rows(what: str, values: Any, count: int) -> np.ndarray:
 def is_pymoo(problem: Any) -> bool:
     """Whether this is a pymoo Problem, by its attributes, without importing pymoo."""
     return all(hasattr(problem, name) for name in ("n_var", "n_obj", "xl", "xu", "evaluate"))
+
+
+def _check_real(problem: Any) -> None:
+    """Raise ValueError if not all variables of a pymoo Problem are real: a search would propose fractions of whole numbers and choices."""
+    named, kind = getattr(problem, "vars", None), getattr(problem, "vtype", None)
+    if named is not None:
+        variables = named.values() if isinstance(named, Mapping) else named
+        found = f"variables by name ({', '.join(sorted({type(one).__name__ for one in variables}))})"
+    elif kind is None or (isinstance(kind, type) and (issubclass(kind, float | np.floating) or kind.__name__ == "Real")):
+        return
+    else:
+        found = f"variables of type {getattr(kind, '__name__', kind)}"
+    what = f"pymoo problem {type(problem).__name__} has {found}"
+    raise ValueError(f"function: {what}; searches propose real numbers only, in arrays (vtype=float, xl, xu), no whole numbers or choices")
 
 
 def _pymoo_bounds(problem: Any) -> list[tuple[float, float]]:

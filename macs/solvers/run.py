@@ -169,7 +169,7 @@ class SearchRun:
     def _belongs(self) -> dict[str, Any]:
         """All data that determine the run, except the seed: a checkpoint with other data is refused."""
         start = None if self.start is None else {"shape": self.start.shape, "hash": hashlib.sha256(self.start.tobytes()).hexdigest()}
-        return {**self.what, "evaluations": self.call.evaluations, "tolerance": self.evaluator.tolerance, "start": start}
+        return {**self.what, "evaluations": self.call.evaluations, "tolerance": self.call.tolerance, "start": start}
 
     def _asked_to_stop(self) -> bool:
         """Whether the work is asked to end; also refreshes the display between long solves."""

@@ -257,10 +257,12 @@ class Solver(SearchMethod):
             Number of rows of X that are evaluated. Default: until more work no longer changes the front, as for `solve`, by MACS; other
             searches need a number.
         constraints : callable, optional
-            `constraints(X) -> G`; a row with all G <= 0 is feasible.
+            `constraints(X) -> G`; a row with all G <= 0 is feasible, whatever their units.
+        tolerance : float
+            What an equality of a pymoo Problem may miss, as a part of its typical size in the box; 8 evaluations find that out.
         names, units, senses : sequences of str, optional
             Names, units and senses ("minimize" or "maximize") of the objectives. Default: "f1", "f2", ..., no units, all minimised.
-        seed, tolerance, start, time_limit, progress, callback, checkpoint
+        seed, start, time_limit, progress, callback, checkpoint
             As for `solve`. A checkpoint knows only bounds and names of a function, so the caller must pass the same function again.
 
         Returns

@@ -30,9 +30,6 @@ from macs.decisions import ReferencePoint
 from macs.pymoo import MACS, most_evaluations
 from macs.search.rounds import PLANNED_EVALUATIONS
 
-STRICT = 1e-300
-"""Tolerance of `macs.MACS` with which a point is feasible where it is for pymoo."""
-
 
 class Equality(ElementwiseProblem):
     """Two distances on a circle, which is a constraint: the front is its arc between the two points."""
@@ -106,7 +103,7 @@ def finished(algorithm: MACS) -> np.ndarray:
 )
 def test_the_points_are_those_of_macs_to_the_last_bit(name, settings):
     problem = get_problem(name)
-    front = macs.MACS(**({"archive": 100} | settings)).minimize(problem, evaluations=1111, seed=5, tolerance=STRICT)
+    front = macs.MACS(**({"archive": 100} | settings)).minimize(problem, evaluations=1111, seed=5)
     res = minimize(problem, MACS(**settings), ("n_eval", 1111), seed=5)
     assert res.algorithm.evaluator.n_eval == 1111 == front.stats["evaluations"]
     assert len(front) and np.array_equal(ordered(res.X, res.F), of(front))
@@ -450,14 +447,16 @@ def test_only_real_variables_with_bounds():
             super().__init__(vars={"a": Real(bounds=(0, 1)), "b": Binary()}, n_obj=1)
 
     for problem, message in (
-        (Mixed(), r"MACS: problem Mixed has variables by name \(Binary, Real\)"),
-        (Problem(n_var=2, n_obj=2, xl=0, xu=1, vtype=bool), "MACS: problem Problem has variables of type bool"),
+        (Mixed(), r"problem Mixed has variables by name \(Binary, Real\)"),
+        (Problem(n_var=2, n_obj=2, xl=0, xu=1, vtype=bool), "problem Problem has variables of type bool"),
         (Problem(n_var=2, n_obj=2, xl=0, xu=9, vtype=int), "has variables of type int"),
         (Problem(n_var=2, n_obj=2), "no bounds"),
         (Problem(n_var=2, n_obj=2, xl=np.zeros(2), xu=np.array([1.0, np.inf])), "variable 'x2'"),
     ):
         with pytest.raises(ValueError, match=message):
             minimize(problem, MACS(), ("n_eval", 10))
+        with pytest.raises(ValueError, match=message):
+            macs.NSGA2(population=4).minimize(problem, evaluations=10)
 
 
 def test_settings_are_refused_as_those_of_macs():

@@ -441,11 +441,22 @@ def test_rates_that_are_numbers_somewhere_are_welcome(rate):
     problem.compile()
 
 
-def test_an_objective_that_depends_on_nothing_may_only_be_the_only_one():
+@pytest.mark.parametrize("value", [lambda phase, x: 0 * x + 3, lambda phase, x: phase.final(3.0) + 1, lambda phase, x: phase.peak(x - x)])
+def test_an_objective_that_is_a_constant_is_refused_alone_too(value):
     problem, phase = bare()
     x = phase.state("height", bounds=(0, 1))
     phase.dynamics(height=np.float64(1))
-    problem.minimize("nothing", 0 * x + 3)
-    problem.compile()
-    problem.minimize("time", phase.final(x))
-    refused(problem.compile, "nothing", "constant")
+    problem.minimize("nothing", value(phase, x))
+    refused(problem.compile, "objective 'nothing'", "is a constant")
+
+
+@pytest.mark.parametrize("compare", [lambda x: x <= 3, lambda x: -(x == 3), lambda x: ca.logic_or(x <= 3, x > 4), lambda x: True])
+def test_a_comparison_is_no_expression(compare):
+    problem, phase = bare()
+    x = phase.state("x", bounds=(0, 1))
+    refused(lambda: phase.path("sum", compare(x), upper=0), "path 'sum' of phase", "is a comparison", "upper=")
+    refused(lambda: phase.dynamics(x=compare(x)), "the rate of 'x'", "is a comparison")
+    refused(lambda: phase.final(compare(x)), "final(...)", "is a comparison")
+    refused(lambda: problem.constraint("c", compare(phase.tf), upper=0), "constraint 'c'", "is a comparison")
+    refused(lambda: problem.minimize("f", compare(phase.tf)), "objective 'f'", "is a comparison")
+    phase.dynamics(x=ca.if_else(x <= 0.5, 1, 0))

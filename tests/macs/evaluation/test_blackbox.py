@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 from boxes import boxed
 from pymoo.core.problem import ElementwiseProblem
+from pymoo.core.problem import Problem as PymooProblem
 from pymoo.problems import get_problem
 
 from macs.evaluation.blackbox import read_bounds
+from problems.vector import SAMPLED
 
 
 def two(X):
@@ -139,6 +141,24 @@ def test_one_objective_may_come_as_a_vector_and_the_function_may_not_change_its_
     assert (result.F.shape, result.Z.max()) == ((4, 1), 1.0)
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_what_is_feasible_does_not_depend_on_the_units_of_constraints(unit):
+    def near(X):
+        return np.column_stack([X[:, 0], 1 - X[:, 0]]), unit * (0.5 - X)
+
+    assert boxed(near, [(0, 1)]).evaluate(np.array([[0.5 - 1e-7], [0.5], [0.6]])).status.tolist() == ["infeasible", "converged", "converged"]
+
+    class OnLine(PymooProblem):
+        def __init__(self):
+            super().__init__(n_var=2, n_obj=2, n_eq_constr=1, xl=0.0, xu=1.0)
+
+        def _evaluate(self, X, out, *args, **kwargs):
+            out["F"], out["H"] = X, unit * (X.sum(axis=1, keepdims=True) - 1)
+
+    found = boxed(OnLine()).evaluate(np.array([[0.5, 0.5 + 1e-5], [0.5, 0.5 + 1e-8], [0.3, 0.7], [0.2, 0.7]]))
+    assert found.status.tolist() == ["infeasible", "converged", "converged", "infeasible"]
+
+
 def test_pymoo_problems_vectorised_and_elementwise_with_equalities():
     tnk = boxed(get_problem("tnk"))
     result = tnk.evaluate(middle(tnk))
@@ -154,7 +174,9 @@ def test_pymoo_problems_vectorised_and_elementwise_with_equalities():
 
     circle = boxed(OnCircle())
     assert circle.lower.tolist() == [-1, -1]
-    assert circle.evaluate(np.array([[0.0, 1.0], [0.0, 0.5], [1.0, 0.0]])).violation.tolist() == [0.0, 0.75, 0.5]
+    of_circle = 0.75 / circle.problem.sizes[0] - 1e-6
+    assert circle.evaluate(np.array([[0.0, 1.0], [0.0, 0.5], [1.0, 0.0]])).violation == pytest.approx([0.0, of_circle, 0.5])
+    assert circle.counts.evaluations == SAMPLED + 3
 
 
 @pytest.mark.parametrize("as_list", [False, True])
