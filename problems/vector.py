@@ -64,7 +64,7 @@ class CompiledVectorProblem:
     rows : callable
         See `Rows`. A row with NaN is a failed evaluation.
     equalities : tuple of int
-        Without `limits`: columns that have to be 0, instead of at most 0. Their residuals are divided by their `sizes`.
+        Without `limits`: columns that have to be 0, instead of at most 0. With any, residuals are divided by the `sizes`.
     address, data
         As of `CompiledProblem`.
 
@@ -113,9 +113,8 @@ class CompiledVectorProblem:
             raise ValueError(f"objectives: function returned {values.shape[1]}, {len(self.goals)} expected")
         F = values * self.signs if self.goals else values
         if self.limits is None:
-            residuals, equal = np.maximum(bounded, 0.0), list(self.equalities)
-            residuals[:, equal] = bounded[:, equal] / self.sizes if equal else 0.0
-            return F, residuals
+            equal = np.isin(np.arange(bounded.shape[1]), self.equalities)
+            return F, np.where(equal, bounded, np.maximum(bounded, 0.0)) / (self.sizes if equal.any() else 1.0)
         lower, upper, scale = (np.array([getattr(limit, side) for limit in self.limits]) for side in ("lower", "upper", "scale"))
         return F, (np.maximum(bounded - upper, 0.0) - np.maximum(lower - bounded, 0.0)) / scale
 
@@ -128,8 +127,8 @@ class CompiledVectorProblem:
 
     @cached_property
     def sizes(self) -> np.ndarray:
-        """Typical absolute value of each equality without limits, over the `SAMPLED` rows: what it may miss follows from its unit."""
-        found = np.abs(self._sampled[1][:, list(self.equalities)])
+        """Typical absolute value of each column, over the `SAMPLED` rows: what an equality may miss follows from its unit."""
+        found = np.abs(self._sampled[1])
         usual = [np.median(one[np.isfinite(one)]) if np.isfinite(one).any() else 0.0 for one in found.T]
         return np.array([size or 1.0 for size in usual])
 

@@ -146,7 +146,8 @@ def test_what_is_feasible_does_not_depend_on_the_units_of_constraints(unit):
     def near(X):
         return np.column_stack([X[:, 0], 1 - X[:, 0]]), unit * (0.5 - X)
 
-    assert boxed(near, [(0, 1)]).evaluate(np.array([[0.5 - 1e-7], [0.5], [0.6]])).status.tolist() == ["infeasible", "converged", "converged"]
+    found = boxed(near, [(0, 1)]).evaluate(np.array([[0.5 - 1e-7], [0.5], [0.6]]))
+    assert found.status.tolist() == ["infeasible", "converged", "converged"]
 
     class OnLine(PymooProblem):
         def __init__(self):
@@ -174,8 +175,9 @@ def test_pymoo_problems_vectorised_and_elementwise_with_equalities():
 
     circle = boxed(OnCircle())
     assert circle.lower.tolist() == [-1, -1]
-    of_circle = 0.75 / circle.problem.sizes[0] - 1e-6
-    assert circle.evaluate(np.array([[0.0, 1.0], [0.0, 0.5], [1.0, 0.0]])).violation == pytest.approx([0.0, of_circle, 0.5])
+    of_line, of_circle = circle.problem.sizes
+    found = circle.evaluate(np.array([[0.0, 1.0], [0.0, 0.5], [1.0, 0.0]]))
+    assert found.violation == pytest.approx([0.0, 0.75 / of_circle - 1e-6, 0.5 / of_line])
     assert circle.counts.evaluations == SAMPLED + 3
 
 
