@@ -34,7 +34,7 @@ from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.ends import ENDS, METHODS, check_points, lexicographic_ends, solve_tasks, tasks_between
 from .gradients.multistart import MultistartSolver, MultistartStopping
-from .gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
+from .gradients.scalarised import MOST_ITERATIONS, WEAK, WORK, GradientSolves, Scalarised
 from .io.console import working
 from .pareto.dominance import BETTER, distinct
 from .refinement.mending import mended, resolve_unverified
@@ -80,7 +80,7 @@ def optimize(
         Number of starts: the first is `start` or the problem's guess, the others are drawn: from everywhere in the bounds, and near the
         best that is known. The best result is returned. "auto": as many as pay; some twenty where each finds the same, fewer where a solve
         takes long, one where a linear objective is at its bound. `stats` has the number of `starts`, how many different `optima` they
-        found, and how often that which is returned was `found`; if only once, `message` says so: there may be better ones.
+        found, and how often that which is returned was `found`; if only once, `message` or the `note` says so.
     seed : int, optional
         Seed of the starts that are drawn. None draws one, which is recorded in `stats`.
     tolerance : float
@@ -346,7 +346,7 @@ class _Job:
                 self._about,
                 self._stats() | {"starts": found.rule.converged, "optima": found.optima, "found": found.hits},
                 status=[found.status],
-                notes=[found.note],
+                notes=["; ".join(filter(None, [found.note, found.once]))],
                 **certified(found.nlp, found.z[None], None, self._sole),
             )
             if found.status == INFEASIBLE:
@@ -397,10 +397,9 @@ class _Job:
     def front(self, found: Sequence[Solved], ranges: np.ndarray | None, **more: Any) -> Front:
         """The results as a front, with their optimality and costates; objectives are scaled by `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
-        status = [solved.status for solved in found]
-        return Front.of(
-            from_vectors(self.nlp, Z, self._about, self._stats(), status=status, **certified(self.nlp, Z, ranges, self._sole), **more)
-        )
+        status, notes = [solved.status for solved in found], [WEAK if solved.message == WEAK else "" for solved in found]
+        more |= {"status": status, "notes": notes, **certified(self.nlp, Z, ranges, self._sole)}
+        return Front.of(from_vectors(self.nlp, Z, self._about, self._stats(), **more))
 
     def _found_once(self) -> str:
         """Words on optima of single objectives that one start alone has found."""

@@ -254,6 +254,12 @@ class NLP(Deriving):
         return self.upper - self.lower
 
     @cached_property
+    def times(self) -> np.ndarray:
+        """Which variables (k,) are free times."""
+        names = {f"{phase.name}.{time.name}" for phase in self.problem.phases for time in (phase.t0, phase.tf)}
+        return np.array([i for i in self.free if self.variables[i].name in names], dtype=int)
+
+    @cached_property
     def scale(self) -> np.ndarray:
         """The scales of the variables (n,)."""
         return np.array([v.scale for v in self.variables])

@@ -15,7 +15,7 @@ from transcription.stopping import stopping
 from ..evaluation.evaluator import CONVERGED
 from ..pareto.directions import divisions_below, simplex_lattice
 from .multistart import MULTISTART, MultistartSolver
-from .scalarised import END, WORK, Scalarised
+from .scalarised import END, WEAK, WORK, Scalarised, without_loss
 
 METHODS = ("pascoletti-serafini", "epsilon")
 """Scalarisations of a sweep."""
@@ -28,10 +28,6 @@ class EndsLimits:
     # Part that is more than the tolerance of the objectives before it explains: if an objective falls by more while these keep their least
     # values, it was not determined by them, and a point where it is lower by more lies in another valley.
     loose: float = 1e-2
-    slack: float = 1e-5  # part that may be lost where the others cannot be improved without any loss
-    soon: int = 50  # most iterations of a first solve that is to improve the others without a loss, else `EndLimits.ties`
-    small: int = 600  # most variables of a program whose iterations take so little that `EndLimits.ties` are spent without slack, too
-    unsure: float = 0.2  # part of what a slack is worth, as its multipliers say, that is not known
     rounds: int = 5  # most rounds in which optima are sought from each other
     gain: float = 1e-6  # what counts as a gain then, in scales
     from_rivals: int = 3  # most times that results along a front are sought again from a better start that another one gave
@@ -44,7 +40,7 @@ ENDS = EndsLimits()
 def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved] | None = None) -> list[Solved]:
     """The lexicographic optimum of each objective, from its optimum alone, `single(i)`, and from the ends of the others, which may lie in
     other valleys: its least value, then those of the others in their order, without a loss in those before, or one of
-    `EndsLimits.slack`."""
+    `EndLimits.slack`."""
     m = len(solver.nlp.problem.goals)
     optima, tried = list[Solved](), dict[tuple[int, int], np.ndarray]()
     for i in range(m):
@@ -80,7 +76,7 @@ def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict
                 found = solver.from_vector(optima[k].z, Scalarised.single(i, m))
                 found = _gone_on(solver, found, optima[i].F[i] - ENDS.loose * spans[i], Scalarised.single(i, m))
             # What an end has lost to the others is none.
-            gain = max(ENDS.gain * scales[i], 2 * ENDS.slack * spans[i])
+            gain = max(ENDS.gain * scales[i], 2 * END.slack * spans[i])
             if found.status == CONVERGED and (optima[i].status != CONVERGED or optima[i].F[i] - found.F[i] > gain):
                 optima[i], improved = found, True
         if not improved:
@@ -92,90 +88,28 @@ def _lexicographic(solver: MultistartSolver, i: int, optima: Sequence[Solved]) -
     best, m = optima[i], len(optima)
     if best.status != CONVERGED:
         return best
-    ceiling, least, spans = np.full(m, np.inf), best.F[i], _spans(optima)
+    before, least, spans, weak = [i], best.F[i], _spans(optima), False
     for j in (k for k in range(m) if k != i):
-        ceiling[i] = best.F[i]
         if not solver.is_least(best, Scalarised.single(j, m)):
-            best, ceiling = _tied(solver, j, best, ceiling, spans, optima[j])
-        ceiling[j] = best.F[j]
+            ceiling = np.where(np.isin(np.arange(m), before), best.F, np.inf)
+            with solver.solves.at_most(END.ties):
+                best = without_loss(solver.from_vector, best, Scalarised.single(j, m, ceiling), END.slack * spans, [optima[j].z])
+            weak |= best.message == WEAK
+        before.append(j)
     # A range may be no more than rounding, where objectives are in no conflict: no solve can tell such a loss.
     if best.F[i] - least > MULTISTART.excess * max(spans[i], nlp_scales(solver.nlp)[i]):
         # What was lost for the others is worth a little of what they gained.
-        near = np.where(np.arange(m) == i, np.inf, best.F + ENDS.slack * spans)
+        near = np.where(np.arange(m) == i, np.inf, best.F + END.slack * spans)
         with solver.solves.at_most(END.ties):
             again = solver.from_vector(best.z, Scalarised.single(i, m, near))
         best = again if again.status == CONVERGED and again.F[i] < best.F[i] else best
-    return best
-
-
-def _tied(
-    solver: MultistartSolver, j: int, best: Solved, ceiling: np.ndarray, spans: np.ndarray, optimum: Solved
-) -> tuple[Solved, np.ndarray]:
-    """The least value of objective j under a ceiling (m,), which `best` attains, also from the `optimum` of j alone; and the ceiling, with
-    `EndsLimits.slack` where it was needed."""
-    # Often there is only one such point: the feasible set has no interior then, and a solve takes long without improving anything.
-    alone, large = Scalarised.single(j, len(spans), ceiling), ENDS.loose * abs(best.F[j] - optimum.F[j])
-    small = len(best.z) <= ENDS.small
-    with solver.solves.at_most(END.ties if small else ENDS.soon):
-        # No slack: where the front is steep, a small loss in one objective changes another by its square root.
-        solved = solver.solve(alone, best.z)
-        for _ in range(ENDS.rounds if small else 0):
-            if solved.status == CONVERGED or not best.F[j] - solved.F[j] > large:
-                break
-            # Much was gained before the iterations ran out.
-            solved = solver.solve(alone, solved.z)
-    if solved.status != CONVERGED:
-        solved, ceiling = _tied_with_slack(solver, j, best, ceiling, ENDS.slack * spans, large)
-    if optimum.status == CONVERGED and best.F[j] - solved.F[j] > large:
-        # Many points have the least values of the objectives before, and the one at hand may lie in a poor valley of this one.
-        # A small gain is none: it may be no more than what a loss within the tolerance, in those before, is worth.
-        with solver.solves.at_most(END.ties):
-            other = solver.from_vector(optimum.z, replace(alone, ceiling=ceiling))
-        if other.status == CONVERGED and solved.F[j] - other.F[j] > large:
-            solved = other
-    return solved, ceiling
-
-
-def _tied_with_slack(
-    solver: MultistartSolver, j: int, best: Solved, ceiling: np.ndarray, slack: np.ndarray, large: float
-) -> tuple[Solved, np.ndarray]:
-    """See `_tied`: solved with slack (m,) first, in fewer iterations, then without slack if the gain is larger than the slack explains."""
-    m = len(slack)
-    exactly, freer = Scalarised.single(j, m, ceiling), Scalarised.single(j, m, ceiling + slack)
-    with solver.solves.at_most(END.ties):
-        near = solver.from_vector(best.z, freer, near=True)
-        if near.status != CONVERGED:
-            near = _gone_on(solver, solver.from_vector(best.z, freer), best.F[j] - large, freer)
-        if near.status != CONVERGED:
-            return best, ceiling
-        gain, explained = best.F[j] - near.F[j], (1 + ENDS.unsure) * _worth(near, j, np.where(ceiling < np.inf, slack, 0.0))
-        if gain <= max(slack[j], explained):
-            return best, ceiling
-        # However a solve without slack ends, it counts if it keeps the objectives before, and lacks only what the slack is worth.
-        enough = np.where(np.arange(m) == j, near.F[j] + max(large, explained), ceiling + MULTISTART.excess / ENDS.slack * slack)
-        exact = solver.from_vector(near.z, exactly, near=True)
-        if not _within(solver, exact, enough):
-            exact = _gone_on(solver, exact, best.F[j] - large, exactly)
-    if exact.status == CONVERGED or _within(solver, exact, enough):
-        return (replace(exact, status=CONVERGED), ceiling) if exact.F[j] < best.F[j] else (best, ceiling)
-    return (near, ceiling + slack) if gain > large else (best, ceiling)
-
-
-def _within(solver: MultistartSolver, solved: Solved, enough: np.ndarray) -> bool:
-    """Whether a result is feasible, and its objectives are at most as large as `enough` (m,)."""
-    return bool(solved.violation <= solver.solves.tolerance and (enough >= solved.F).all())
+    return replace(best, message=WEAK) if weak and best.message != WEAK else best
 
 
 def _gone_on(solver: MultistartSolver, solved: Solved, enough: float, task: Scalarised) -> Solved:
     """A result for one objective; if it did not converge but is below the value `enough`, the result of a further solve near it."""
     promising = solved.status != CONVERGED and solved.F[task.moving][0] < enough
     return solver.from_vector(solved.z, task, near=True) if promising else solved
-
-
-def _worth(solved: Solved, j: int, slack: np.ndarray) -> float:
-    """The gain in objective j that slacks (m,) of others explain: their multipliers are its slopes; the root of a slack is twice that."""
-    assert solved.multipliers is not None
-    return float(2 * solved.multipliers[: len(slack)] @ slack / solved.multipliers[j])
 
 
 def _spans(optima: Sequence[Solved]) -> np.ndarray:

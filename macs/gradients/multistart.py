@@ -10,6 +10,7 @@ Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimiza
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -34,6 +35,7 @@ class MultistartLimits:
     excess: float = 1e-8  # part of an objective's range by which its limit may be exceeded
     clearly: float = 1e-7  # difference in alpha by which a result is clearly better: the accuracy of solves
     iterations: int = 200  # most of each further start
+    held: int = 50  # most iterations of a solve for given times: one that takes more has no feasible point, or is not convex
     infeasible: tuple[int, int] = (8, 16)  # fewest and most starts without a feasible vector; between them, what took `WORK.little`
     everywhere: int = 3  # starts from everywhere before only each second one is: the others are near the best that is known
     hopeless: float = 100.0  # scales by which propagated states violate constraints so that the states of the guess are the better start
@@ -42,6 +44,7 @@ class MultistartLimits:
     many: int = 60  # where optima are many: solves that are enough, if there are also `last` times as many as it took to find the best
     last: int = 2
     most: int = 200
+    once: float = 2.0  # multiple of the work for starts where the best of several optima was found once: that is no proof
     same: float = 1e-3  # losses that differ by less are of one optimum: as a part of the differences between all optima,
     rounding: float = 1e-5  # and of their size
 
@@ -138,6 +141,11 @@ class MultistartStopping:
         return int(np.count_nonzero(differences <= (self._same if same is None else same)))
 
     @property
+    def found_once(self) -> bool:
+        """Whether one start alone found the best of several optima."""
+        return self.hits() == 1 < self.optima()
+
+    @property
     def complete(self) -> bool:
         """Whether further starts are not expected to find another optimum."""
         found, optima = self.converged, self.optima()
@@ -215,26 +223,40 @@ class MultistartSolver:
     def seek(self, task: Scalarised, stopping_rule: MultistartStopping) -> Solved:
         """The best result of a multistart: further starts end when they have taken a little work, or as much as the first one."""
         before = self.solves.counts.work
-        first = self.with_feasible_start(self.solve(task), task)
+        first = self.first(task)
         stopping_rule.add(task.optimum(first))
         return self.drawn(first, task, stopping_rule, max(WORK.little, self.solves.counts.work - before))[0]
 
+    def first(self, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
+        """The result of the first of several starts, from something feasible if it leads to nothing feasible; one that is drawn is given up
+        soon: on a coarse mesh nothing may be feasible. See `with_feasible_start`."""
+        if self.closest is not None or len(self._known):
+            return self.with_feasible_start(self.closest or self.solve(task), task, tries)
+        with self.solves.at_most(MULTISTART.iterations):
+            solved = self.from_vector(self._starts.draw()[0], task)
+        if solved.status != CONVERGED and solved.violation <= self.solves.tolerance:
+            return self.from_vector(solved.z, task)
+        return self.with_feasible_start(solved, task, tries)
+
     def drawn(self, best: Solved, task: Scalarised, stopping_rule: MultistartStopping, work: float) -> tuple[Solved, list[Solved]]:
-        """The best result, one of which is known, and those of drawn starts, until there are enough or so much work is done."""
-        found, limit = list[Solved](), self.solves.counts.work + work
+        """The best result, one of which is known, and those of drawn starts, until there are enough or so much work is done; twice as much
+        where the best of several optima was found only once."""
+        found, before, sides = list[Solved](), self.solves.counts.work, self._sides()
         with suppress(Stopped):
             while not (
                 stopping_rule.enough
                 or self.closest
                 or self.drawn_enough
-                or self.solves.counts.work >= limit
+                or self.solves.counts.work - before >= work * (MULTISTART.once if stopping_rule.found_once else 1.0)
                 or stopping()
                 or self.is_least(best, task)
             ):
                 # Where none has converged yet, they may all take long.
                 converged = stopping_rule.converged
                 with self.solves.at_most(MULTISTART.iterations if converged else self.solves.max_iterations):
-                    found.append(self.from_drawn(task, best if converged else None))
+                    side = next(sides, None)
+                    other = self.from_drawn(task, best if converged else None) if side is None else self.from_times(best.z, task, side)
+                    found.append(other)
                 # One that is hardly better is the same optimum: that of the first start is as good.
                 if stopping_rule.add(task.optimum(found[-1])) or (not stopping_rule.converged and found[-1].violation < best.violation):
                     best = found[-1]
@@ -247,17 +269,24 @@ class MultistartSolver:
             return self.closest
         if solved.violation <= self.solves.tolerance or len(self._known) > self._given:
             return solved
-        tried, limit, known = list[Solved](), self.solves.counts.work + WORK.little, self.nearest(task)
+        tried, limit, starts = list[Solved](), self.solves.counts.work + WORK.little, self._first_starts(solved.z, task)
         fewest, most = tries or MULTISTART.infeasible
         while not stopping() and len(tried) < most and (len(tried) < fewest or self.solves.counts.work < limit):
-            start = self._starts.draw()[0] if known is None else known
-            near, known = self.solves.least_violation(self.nlp, start), None
+            near = self.solves.least_violation(self.nlp, next(starts))
             if near.status == CONVERGED:
                 return min(solved, self.from_vector(near.z, task), key=task.rank)
             tried.append(near)
         if sum(near.status == INFEASIBLE for near in tried) >= fewest:
             self.closest = min(tried, key=lambda near: near.violation)
         return self.closest or solved
+
+    def _first_starts(self, z: np.ndarray, task: Scalarised) -> Iterator[np.ndarray]:
+        """Vectors (n,) near which something feasible is sought: the best known, one (n,) with its times at their bounds, and drawn ones."""
+        known = self.nearest(task)
+        yield from () if known is None else (known,)
+        yield from (self._with_times(z, times) for times in self._sides())
+        while True:
+            yield self._starts.draw()[0]
 
     def from_vector(self, start: np.ndarray, task: Scalarised, near: bool = False) -> Solved:
         """The result of one solve from a vector (n,), or near it only; if it converged, later solves may begin at it."""
@@ -275,6 +304,24 @@ class MultistartSolver:
             if found[-1].status == CONVERGED or best is not None:
                 break
         return min(found, key=task.rank)
+
+    def _sides(self) -> Iterator[np.ndarray]:
+        """Times (k,) to begin with: all at their upper bounds, then all at their lower ones."""
+        times = self.nlp.times
+        return iter((self.nlp.upper[times], self.nlp.lower[times]) if len(times) else ())
+
+    def _with_times(self, z: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """The vector (n,) with other times (k,)."""
+        other = z.copy()
+        other[self.nlp.times] = times
+        return other
+
+    def from_times(self, start: np.ndarray, task: Scalarised, times: np.ndarray) -> Solved:
+        """The result of a solve that begins at the optimum for these times (k,), from a vector (n,): a linear-quadratic problem is convex
+        for given times, and where these are free, too, its solves end at times where the optimum hardly depends on them."""
+        with self.solves.at_most(MULTISTART.held):
+            found = self.solves(self.nlp, self._with_times(start, times), task, held=self.nlp.times)
+        return self.from_vector(found.z, task, near=True) if found.status == CONVERGED else found
 
     def merits(self, task: Scalarised, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
         """Merits (k,) of points F (k, m), to be minimised: alpha plus the excess over constraints, and over limits in ranges of the known

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -88,9 +89,46 @@ class EndLimits:
     tied: float = 1e-6  # what counts as no loss of its own objective then, in units
     close: float = 1e-3  # violation up to which a start on another mesh is nearly the end itself
     ties: int = 150  # most iterations of a solve that is to improve the others
+    slack: float = 1e-5  # part of an objective's range that may be lost where the others cannot be improved without any loss
+    unsure: float = 0.2  # part of what a slack is worth, as its multipliers say, that is not known
 
 
 END = EndLimits()
+
+
+WEAK = "it may be improved in other objectives without a loss in its own: no solve for these converged"
+"""Message of an end."""
+
+
+def without_loss(
+    solve: Callable[[np.ndarray, Scalarised, bool], Solved], end: Solved, task: Scalarised, slack: np.ndarray, others: Sequence[np.ndarray] = ()
+) -> Solved:
+    """The least value of a task under a ceiling (m,) that an end attains; also from other vectors (n,), which may lie in better valleys.
+
+    Often the end alone attains it: nothing is strictly inside then, and a solve takes long without improving anything. So there is `slack`
+    (m,) first. If multipliers explain the gain, the end stays. Otherwise a solve without slack follows; if it fails, what the slack loses
+    counts as nothing.
+    """
+    assert task.ceiling is not None
+    limited, freer = task.ceiling < np.inf, replace(task, ceiling=task.ceiling + slack)
+    best = solve(end.z, freer, True)
+    if best.status != CONVERGED:
+        best = solve(end.z, freer, False)
+    if best.status != CONVERGED:
+        return replace(end, message=WEAK)
+    explained = float(np.max(slack[task.moving] / task.weights[task.moving]))
+    if best.multipliers is not None:
+        # They are slopes; the root of a slack is twice that.
+        worth = best.multipliers[: len(slack)]
+        rate = float(worth[limited] @ slack[limited]) / float(worth[task.moving] @ task.weights[task.moving])
+        explained = max(explained, 2 * (1 + END.unsure) * rate)
+    if task.alpha(end.F) - task.alpha(best.F) <= explained:
+        return end
+    best = min([best, *(solve(other, freer, False) for other in others)], key=task.rank)
+    exact = solve(best.z, task, True)
+    if exact.status != CONVERGED:
+        return best
+    return exact if task.alpha(exact.F) < task.alpha(end.F) else end
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,15 +169,14 @@ class LexicographicEnd(Scalarised):
                 first = held
         if first.status != CONVERGED:
             return first
-        # No slack: where the front is steep, a small loss in one objective changes another by its square root.
         others = Scalarised(np.where(mine, np.inf, first.F), units, np.where(mine, first.F, np.inf))
         # The first solve does not look at the other objectives, and often leaves a start that was nearly the end.
         (F,), (violation,) = nlp.evaluate(start[None])
-        closer = violation <= END.close and bool((first.F >= F).all())
+        closer = [start] if violation <= END.close and bool((first.F >= F).all()) else []
         with solves.at_most(END.ties):
-            second = solves(nlp, start if closer else first.z, others, near)
+            second = without_loss(partial(solves, nlp), first, others, END.slack * units, closer)
         # What tells whether the one objective is at its least are the multipliers for that alone.
-        return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
+        return replace(second, multipliers=first.multipliers)
 
 
 MOST_ITERATIONS = 500
@@ -166,14 +203,14 @@ class GradientSolves:
         self.counts, self._persistent, self._most_work = Counts(), True, np.inf
         self.before: Callable[[], None] = lambda: None
 
-    def __call__(self, nlp: NLP, start: np.ndarray, task: Scalarised, near: bool = False) -> Solved:
-        """The result of one solve from a vector (n,), or near it only; see `scalarize`."""
+    def __call__(self, nlp: NLP, start: np.ndarray, task: Scalarised, near: bool = False, held: Sequence[int] | np.ndarray = ()) -> Solved:
+        """The result of one solve from a vector (n,), or near it only, where some variables keep their values; see `scalarize`."""
         self.before()
         iterations = max(1, int(min(self.max_iterations, (self._most_work - self.counts.work) / len(nlp.variables))))
         persistent = self._persistent and iterations == self.max_iterations
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": iterations, "persistent": persistent}
         aim: dict[str, Any] = {"reference": task.reference, "weights": task.weights, "ceiling": task.ceiling}
-        return self._counted(nlp, scalarize(nlp, start, **aim, near=near, **limits))
+        return self._counted(nlp, scalarize(nlp, start, **aim, near=near, held=held, **limits))
 
     def least_violation(self, nlp: NLP, start: np.ndarray) -> Solved:
         """A feasible or least violating vector near a vector (n,); see `least_violation`."""

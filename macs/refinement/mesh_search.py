@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
+import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledProblem
@@ -18,7 +19,7 @@ from transcription import DFET
 from transcription.base import NLP, Transcription
 from transcription.catalogue import stated
 from transcription.meshed import Meshed
-from transcription.meshes.verdict import Wanted, simulated_objectives
+from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import Solved
 from transcription.phases.mesh import PhaseMesh
 from transcription.stopping import Stopped
@@ -43,8 +44,6 @@ COARSE: tuple[Meshed, ...] = (
 """Meshes to begin on, in the order in which they are tried: where one leads nowhere, another often does."""
 FINEST: Meshed = DFET(20, 3)
 """That of these which is tried next where one has no feasible point."""
-SECOND: Meshed = DFET(16, 3)
-"""A mesh for other starts, beside that from which an optimum came: what one basis hides another may show."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +58,13 @@ class MeshSearchLimits:
     hopeless: int = 2  # coarse meshes without anything feasible after which no other is tried
     infeasible: tuple[int, int] = (3, 3)  # fewest and most starts without a feasible vector on the first of these
     clearly: float = 1e-3  # part of its unit by which an objective on a coarse mesh differs that is another optimum
-    # Parts of `WORK.little` that starts of an end take on the first mesh, and on another one, which only confirms it.
-    starts: tuple[float, float] = (0.4, 0.2)
-    unseen: float = 0.05  # probability of another optimum below which starts on that are enough if all led to one
+    starts: float = 0.4  # part of `WORK.little` that starts of an end take
+    even: tuple[int, int] = (16, 40)  # fewest and most elements of the mesh for other starts
     refined: int = 2  # most other optima that are refined
     elements: int = 40  # most of a phase on a common mesh: a search evaluates it thousands of times
     near: float = 0.25  # an edge is left out if the element is then longer than the shortest there by at most this part
     lost: float = 0.1  # part of its range by which a mesh may miss a guess: on a coarser one what it says is lost
+    angle: float = 3.0  # through which linear dynamics may swing on a cubic element, in radians
     guessed: tuple[int, ...] = (8, 16, 32)  # numbers of cubic elements that are considered for that
 
 
@@ -79,10 +78,10 @@ def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
 
 
 def coarse_meshes(problem: Problem | CompiledProblem) -> list[Meshed]:
-    """Meshes to begin on, in their order: meshes fine enough for a guess, the problem's own, and coarse ones."""
+    """Meshes to begin on, in their order: meshes fine enough for a guess and for oscillations, the problem's own, and coarse ones."""
     own = default_transcription(problem)
     coarse = list(dict.fromkeys([own, *COARSE] if isinstance(own, Meshed) else COARSE))
-    elements = guessed_elements(problem.compile())
+    elements = max(guessed_elements(problem.compile()), swinging_elements(problem.compile()))
     if elements > coarse[0].elements:
         coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
     return coarse
@@ -95,6 +94,22 @@ def guessed_elements(problem: CompiledProblem) -> int:
     profiles = [guess for guess in guesses if np.ndim(guess) and np.ndim(guess[0]) == 1 and len(guess[0]) > 2]
     enough = (count for count in SEARCH.guessed if all(_missed(times, values, count) <= SEARCH.lost for times, values in profiles))
     return next(enough, SEARCH.guessed[-1])
+
+
+def swinging_elements(problem: CompiledProblem) -> int:
+    """The least number of equal elements, up to a limit, on each of which dynamics that are linear in the states swing through no more than
+    an angle that cubic polynomials describe; 0 where dynamics are not linear."""
+    counts = [0]
+    for phase in problem.phases:
+        groups = (phase.states, phase.controls, (phase.tf,), (phase.t0, phase.tf, *problem.parameters))
+        symbols = [ca.MX.sym("v", len(group)) for group in groups]
+        rates = phase.dynamics(*symbols)
+        if not any(ca.which_depends(rates, symbols[0], 2, True)):
+            slopes = ca.Function("slopes", symbols, [ca.jacobian(rates, symbols[0])])
+            matrix = np.array(slopes(*([0.5 * (v.lower + v.upper) for v in group] for group in groups)))
+            turned = np.abs(np.linalg.eigvals(np.nan_to_num(matrix)).imag).max() * min(phase.duration[1], phase.tf.upper - phase.t0.lower)
+            counts.append(int(min(np.ceil(turned / SEARCH.angle), SEARCH.elements)))
+    return max(counts)
 
 
 def _missed(times: np.ndarray, values: np.ndarray, count: int) -> float:
@@ -163,6 +178,12 @@ class MeshedOptimum:
         return self.rule.hits(self.alpha, SEARCH.clearly * self.unit)
 
     @property
+    def once(self) -> str:
+        """Words on an optimum that is the best of several and that one start alone found."""
+        words = f"one of {self.rule.starts} starts found it, which led to {self.optima} optima: there may be better ones"
+        return words if self.hits == 1 < self.optima else ""
+
+    @property
     def note(self) -> str:
         """Why it is not good, or other remarks."""
         note = f"no solve converged: {self.solved.message}" if self.refinement is None else self.refinement.note
@@ -195,15 +216,6 @@ class TaskOptima:
                 achieved, own = min(known, default=np.inf), loop.programs(best.method)
                 one = replace(one, nlp=own, refinement=found, unit=unit, loss=loss, achieved=achieved)
         self.all.append(one)
-
-    def promising(self, method: Meshed, nlp: NLP, solved: Solved) -> bool:
-        """Whether a result on a coarse mesh may be better than an optimum that is good: its simulation is better, too, if it ends."""
-        best = self.best
-        if not best.good:
-            return True
-        verdict = self.loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), self._units, True).verdict
-        simulated = self.task.loss(simulated_objectives(self.loop.problem, verdict.simulation))
-        return self.task.loss(solved.F) < best.loss and not simulated >= best.loss
 
     @property
     def best(self) -> MeshedOptimum:
@@ -250,12 +262,8 @@ class MeshSearch:
                 # A coarse mesh may have no feasible point where a finer one has.
                 left.remove(FINEST)
                 left.insert(0, FINEST)
-        if self._starts is None:
-            for i, optima in enumerate(self.tasks):
-                best = optima.best
-                complete = self._ends and best.good and best.rule.complete
-                if not (complete or best.certain(optima.task)):
-                    self._elsewhere(i)
+        if self._starts is None and not self._ends and not self.tasks[0].best.certain(self.tasks[0].task):
+            self._elsewhere(0)
 
     def best(self, i: int) -> MeshedOptimum:
         """The best optimum of task i."""
@@ -280,16 +288,15 @@ class MeshSearch:
 
         def single(i: int) -> Solved:
             optima, rule = self.tasks[i], MultistartStopping()
-            solved = solver.solve(optima.task)
-            if self._starts is None:
-                solved = solver.with_feasible_start(solved, optima.task, SEARCH.infeasible if not self._hopeless else MULTISTART.infeasible)
+            tries = SEARCH.infeasible if not self._hopeless else MULTISTART.infeasible
+            solved = solver.solve(optima.task) if self._starts else solver.first(optima.task, tries)
             rule.add(optima.task.optimum(solved))
             first.append(solved)
             rules.append(rule)
             if self._starts or self._explored[i] or solved.status != CONVERGED or solver.is_least(solved, optima.task):
                 return solved
             self._explored[i].add(method)
-            work = WORK.little * (SEARCH.starts[0] if self._ends else 1.0)
+            work = WORK.little * (SEARCH.starts if self._ends else 1.0)
             return solver.drawn(solved, optima.task, rule, min(work, self.loop.left))[0]
 
         best = lexicographic_ends(solver, single) if self._ends else [single(0)]
@@ -309,53 +316,37 @@ class MeshSearch:
                 optima.add(method, nlp, one, rule)
 
     def _elsewhere(self, i: int) -> None:
-        """Solve from other starts on coarse meshes where not yet done, if that takes little work; refine results that are better than the
-        best optimum or, if that is not good, different from it."""
+        """Solve from the best optimum and other starts on an even mesh as fine as its own, if that takes little work, and refine results
+        that are better than it or, if it is not good, different from it: on a coarse mesh good optima may be hidden among spurious ones."""
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
-        others: list[tuple[float, Meshed, Solved, MultistartStopping]] = []
-        budget = max(SEARCH.share * before, WORK.little)
-        starts = SEARCH.starts[1] * WORK.little if self._ends else budget
-        best = optima.best
-        for method in dict.fromkeys((best.method, SECOND)):
-            if method not in self._explored[i]:
-                with suppress(Stopped):
-                    others += self._others(i, method, before + starts)
-        rivals = [other.best.refinement for other in self.tasks if self._ends and other is not optima]
-        front = [refinement.best.F for refinement in rivals if refinement is not None]
-        with loop.at_most(budget):
-            for _, method, solved, rule in sorted(others, key=lambda other: other[0])[: SEARCH.refined]:
-                nlp = self.solvers[method].nlp
-                if not loop.ended and (not self._ends or optima.promising(method, nlp, solved)):
-                    optima.add(method, nlp, solved, rule, front)
-
-    def _others(self, i: int, method: Meshed, most: float) -> list[tuple[float, Meshed, Solved, MultistartStopping]]:
-        """Other optima on a coarse mesh that are worth refining, and their losses there against the best, in its units."""
-        loop, optima = self.loop, self.tasks[i]
-        best = optima.best
-        if loop.ended or loop.work >= most or best.refinement is None:
-            return []
-        if method == best.method:
-            solver, known, rule = self.solvers[method], best.solved, best.rule
-        else:
-            nlp = loop.programs(method)
-            rule = MultistartStopping(SEARCH.unseen) if self._ends else MultistartStopping()
-            solver = self.solvers.setdefault(method, MultistartSolver(nlp, None, 1, self._rng, loop.solves))
+        best, task, budget = optima.best, optima.task, max(SEARCH.share * before, WORK.little)
+        if best.refinement is None or loop.ended:
+            return
+        present = best.refinement.best
+        method = even(present.method)
+        nlp, rule, found = loop.programs(method), MultistartStopping(), list[Solved]()
+        solver = self.solvers.setdefault(method, MultistartSolver(nlp, None, 1, self._rng, loop.solves))
+        with suppress(Stopped):
             with loop.solves.at_most(MULTISTART.iterations):
-                known = solver.from_vector(nlp.interpolate(best.refinement.best.trajectory), optima.task, self._ends)
-            rule.add(optima.task.optimum(known))
-        least = optima.task.loss(known.F) if known.status == CONVERGED else np.inf
-        # What is better by no more than the error of this mesh may be the same optimum.
-        limit = least
-        if self._ends and best.good:
-            limit = min(least, best.loss) - (abs(least - best.loss) if np.isfinite(least) else 0.0)
-        seen, found = [least], list[tuple[float, Meshed, Solved, MultistartStopping]]()
-        for solved in solver.drawn(known, optima.task, rule, min(most - loop.work, loop.left))[1]:
-            loss = optima.task.loss(solved.F)
+                known = solver.from_vector(nlp.interpolate(present.trajectory), task)
+            rule.add(task.optimum(known))
+            found = [known, *solver.drawn(known, task, rule, min(before + budget - loop.work, loop.left))[1]]
+        seen, promising = [best.loss], list[Solved]()
+        for solved in sorted(found, key=task.rank):
+            loss = task.loss(solved.F)
             if solved.status == CONVERGED and all(abs(loss - other) > SEARCH.clearly * best.unit for other in seen):
                 seen.append(loss)
-                if loss < limit or not (best.good or self._ends):
-                    found.append(((loss - least) / best.unit, method, solved, rule))
-        return found
+                promising += [solved] if loss < best.loss or not best.good else []
+        with loop.at_most(budget):
+            for solved in promising[: SEARCH.refined]:
+                if not loop.ended:
+                    optima.add(method, nlp, solved, rule)
+
+
+def even(method: Meshed) -> Meshed:
+    """DFET on equal elements, as many as a method has in the phase with most of them, within limits."""
+    count = max([method.elements, *(len(mesh.edges) - 1 for mesh in method.meshes.values())])
+    return DFET(int(np.clip(count, *SEARCH.even)), COARSE[0].order + 1)
 
 
 @dataclass(frozen=True)

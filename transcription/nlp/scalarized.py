@@ -10,6 +10,7 @@ objectives of a feasible point as the reference, alpha <= 0 means that none is w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -126,6 +127,7 @@ class _Settings:
     max_iterations: int
     seconds: float
     scaled: bool  # whether MUMPS scales its matrices
+    held: np.ndarray  # which variables keep their values
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,8 +176,10 @@ def scalarize(
     seconds: float = 600.0,
     persistent: bool = True,
     near: bool = False,
+    held: Sequence[int] | np.ndarray = (),
 ) -> Solved:
-    """Descend from a start (n,) to the front: least alpha with F - reference <= alpha weights (m,); ceiling (m,), margin (r,)."""
+    """Descend from a start (n,) to the front: least alpha with F - reference <= alpha weights (m,); ceiling (m,), margin (r,). The
+    variables `held` keep the start's values."""
     start = back_in_bounds(nlp, start)
     if stopping():
         return not_begun(nlp, start)
@@ -192,7 +196,7 @@ def scalarize(
     # Scaling by MUMPS takes some per cent of an iteration. Where limits of objectives leave nothing strictly inside, from feasible starts
     # for several objectives, and from starts that are drawn, iterations without may take many times as long: 30 times on the skip entry.
     scaled = task.limited or drawn or (feasible and several)
-    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled))
+    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled), np.array(held, dtype=int))
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
         left = max_iterations - sum(solved.iterations for solved in found)
@@ -284,6 +288,7 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     except Stopped:
         return not_begun(nlp, start), False
     lower, upper, made_up = _box(nlp, start, strategy.radius)
+    lower[settings.held], upper[settings.held], made_up[:, settings.held] = start[settings.held], start[settings.held], False
     slack = min(1e-8, SOLVE.slack * tolerance)
     states = np.where(made_up, 0.0, slack * nlp.scale)
     states[:, nlp.free] = 0.0

@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs import optimize, payoff
-from macs.gradients import ends
 from macs.gradients.ends import ENDS, lexicographic_ends, moved_along
 from macs.gradients.multistart import MultistartSolver
-from macs.gradients.scalarised import GradientSolves, Scalarised
+from macs.gradients.scalarised import WEAK, GradientSolves, Scalarised, without_loss
 from problems import Problem
 from transcription import DFET
 
@@ -39,11 +38,8 @@ def optimum_from(solver: MultistartSolver, i: int, p: float):
     return solver.from_vector(start, Scalarised.single(i, 2)), place
 
 
-@pytest.mark.parametrize(("small", "soon"), [(ENDS.small, ENDS.soon), (0, ENDS.soon), (0, 1)])
 @pytest.mark.parametrize("other", [GOOD, POOR])
-def test_an_end_lies_in_the_best_valley_that_is_known(monkeypatch, other, small, soon):
-    """Also where a program is not small, and where no solve without slack ends soon."""
-    monkeypatch.setattr(ends, "ENDS", replace(ENDS, small=small, soon=soon))
+def test_an_end_lies_in_the_best_valley_that_is_known(other):
     solver = solver_of_two_valleys()
     (first, place), (second, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, other)
     end = lexicographic_ends(solver, [first, second].__getitem__)[0]
@@ -73,9 +69,8 @@ def test_an_end_is_also_sought_from_those_of_the_others():
 
 
 @pytest.mark.parametrize("power", [2, 4])
-def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch, power):
+def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(power):
     """Of p^power and -p, the first has one optimum: with a slack s of a range of 1, the second gains s^(1 / power), for the slack alone."""
-    monkeypatch.setattr(ends, "ENDS", replace(ENDS, small=0, soon=1))
     problem = Problem("vertical")
     run = problem.phase("run", t0=0.0, tf=1.0)
     x, p = run.state("x", bounds=(-2, 2), initial=0), problem.parameter("p", bounds=(-1, 1))
@@ -85,14 +80,26 @@ def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(monkeypatch
     solver = MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
     (one, place), (other, _) = optimum_from(solver, 0, 0.0), optimum_from(solver, 1, 0.9)
     assert np.abs(one.F).max() < 1e-6 and np.abs(other.F - [1, -1]).max() < 1e-6
-    slack = np.array([1e-5, 0.0])
-    near = solver.from_vector(one.z, Scalarised.single(1, 2, np.array([1e-5, np.inf])), near=True)
+    task, slack = Scalarised.single(1, 2, np.array([one.F[0], np.inf])), np.full(2, 1e-5)
+    near = solver.from_vector(one.z, replace(task, ceiling=task.ceiling + slack), near=True)
     assert near.F[1] == pytest.approx(-(1e-5 ** (1 / power)), rel=0.01)
-    assert ends._worth(near, 1, slack) == pytest.approx(2 / power * 1e-5 ** (1 / power), rel=0.01)
     before = solver.solves.counts.gradient_solves
-    end, _ = ends._tied(solver, 1, one, np.array([one.F[0], np.inf]), np.ones(2), other)
+    end = without_loss(solver.from_vector, one, task, slack, [other.z])
     assert end.F[0] <= one.F[0] + 1e-8 and abs(end.z[place]) < 1e-2
-    assert power == 4 or (end is one and solver.solves.counts.gradient_solves == before + 2)
+    assert power == 4 or (end is one and solver.solves.counts.gradient_solves == before + 1)
+
+
+def test_an_end_that_cannot_be_improved_with_slack_either_says_so():
+    solver = solver_of_two_valleys()
+    (first, _), (second, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, GOOD)
+    task = Scalarised.single(1, 2, np.array([first.F[0], np.inf]))
+    failing = replace(second, status="failed")
+    assert without_loss(lambda z, task, near: failing, first, task, np.full(2, 1e-5)).message == WEAK
+
+    def only_with_slack(z, asked, near):
+        return second if asked.ceiling[0] > task.ceiling[0] else failing
+
+    assert without_loss(only_with_slack, first, task, np.full(2, 1e-5)) is second
 
 
 @pytest.mark.slow
