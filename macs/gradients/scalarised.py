@@ -101,7 +101,11 @@ WEAK = "it may be improved in other objectives without a loss in its own: no sol
 
 
 def without_loss(
-    solve: Callable[[np.ndarray, Scalarised, bool], Solved], end: Solved, task: Scalarised, slack: np.ndarray, others: Sequence[np.ndarray] = ()
+    solve: Callable[[np.ndarray, Scalarised, bool], Solved],
+    end: Solved,
+    task: Scalarised,
+    slack: np.ndarray,
+    others: Sequence[np.ndarray] = (),
 ) -> Solved:
     """The least value of a task under a ceiling (m,) that an end attains; also from other vectors (n,), which may lie in better valleys.
 

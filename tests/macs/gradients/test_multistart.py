@@ -55,6 +55,49 @@ def test_when_starts_are_enough(losses, last):
     assert rule.enough
 
 
+@pytest.mark.parametrize(
+    ("losses", "once"), [([1.0], False), ([1.0, 2.0], True), ([1.0, 2.0, 1.0], False), ([1.0, 1.0, 0.5], True), ([], False)]
+)
+def test_the_best_of_several_that_was_found_once(losses, once):
+    assert after(losses).found_once == once
+
+
+def test_starts_are_sought_longer_where_the_best_of_several_was_found_once(monkeypatch):
+    """Made-up results of one unit of work each: losses that never repeat, or always do."""
+    nlp = DFET(1, 1).transcribe(wells([1.0] * 3))
+    counted = []
+    for losses in (iter(np.arange(-1.0, -99.0, -1.0)), iter([-1.0] * 99)):
+        solver = MultistartSolver(nlp, None, None, np.random.default_rng(0), GradientSolves(1e-6))
+
+        def drawn(task, best=None, losses=losses, solver=solver):
+            solver.solves.counts.work += 1
+            return Solved(nlp.lower, np.array([next(losses), 0.0]), 0.0, "converged", 1)
+
+        monkeypatch.setattr(solver, "from_drawn", drawn)
+        rule = MultistartStopping()
+        best = drawn(None)
+        rule.add(best.F[0])
+        counted.append(len(solver.drawn(best, Scalarised.single(0, 2), rule, 10.0)[1]))
+    assert counted == [10 * MULTISTART.once, 10]
+
+
+def test_solves_for_times_at_their_bounds():
+    """The cost of a linear drive falls with the time, but for a plateau: a solve from there ends on it."""
+    problem = Problem("plateau")
+    drive = problem.phase("drive", t0=0.0, tf=(1.0, 3.0))
+    x = drive.state("x", bounds=(-4, 4), initial=0, final=1)
+    drive.dynamics(x=drive.control("u", bounds=(-4, 4)) + 0.0 * x)
+    problem.minimize("cost", -((drive.tf - 2.0) ** 3))
+    solver = MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
+    nlp, task = solver.nlp, Scalarised.single(0, 1)
+    (column,) = nlp.times
+    assert nlp.variables[column].name == "drive.tf"
+    start = nlp.first_guess(0.5 * (nlp.lower + nlp.upper)[nlp.free][None])[0]
+    held = solver.solves(nlp, start, task, held=nlp.times)
+    assert held.status == "converged" and held.z[column] == 2.0
+    assert solver.from_times(start, task, nlp.upper[nlp.times]).F[0] == pytest.approx(-1.0, abs=1e-6)
+
+
 @pytest.mark.slow
 @given(st.lists(st.sampled_from([1.0, 2.0, 5.0, None]), min_size=1, max_size=40), st.floats(-8e-6, 8e-6))
 def test_counts_of_starts(losses, noise):

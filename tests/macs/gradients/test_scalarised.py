@@ -58,7 +58,9 @@ ALONE: list[Answer] = [("converged", (1.9, 5.1)), ("converged", (1.9, 5.1 - 1e-5
         pytest.param(STAYS, FAR, 2, [-1, 0, 1], [1.90001, np.inf], id="with slack, then without"),
         pytest.param(ALONE, FAR, 0, [-1, 0], [1.90001, np.inf], id="the slack alone gains"),
         pytest.param([*STAYS[:2], ("failed", (1.9, 9.9))], FAR, 1, [-1, 0, 1], [1.90001, np.inf], id="without slack it fails"),
-        pytest.param([*STAYS[:2], *STAYS[1:]], Mesh((1.9, 5.0), 1e-5), 3, [-1, 0, -1, 1], [1.90001, np.inf], id="the start was nearly the end"),
+        pytest.param(
+            [*STAYS[:2], *STAYS[1:]], Mesh((1.9, 5.0), 1e-5), 3, [-1, 0, -1, 1], [1.90001, np.inf], id="the start was nearly the end"
+        ),
         pytest.param(STAYS, Mesh((1.9, 5.2), 1e-5), 2, [-1, 0, 1], [1.90001, np.inf], id="the start is worse in the other"),
         pytest.param(STAYS, Mesh((1.91, 5.0), 1e-5), 2, [-1, 0, 1], [1.90001, np.inf], id="the start is worse in the one"),
         # The other objective by no more than a twentieth of its unit.

@@ -15,7 +15,16 @@ from smooth_problems import time_against_effort
 from macs import MACS, NSGA2, optimize, payoff
 from macs.gradients.scalarised import GradientSolves, Scalarised
 from macs.refinement.mesh_loop import LOOP, MeshLoop, Programs
-from macs.refinement.mesh_search import COARSE, SEARCH, MeshSearch, _together, default_transcription, guessed_elements, search_meshes
+from macs.refinement.mesh_search import (
+    COARSE,
+    SEARCH,
+    MeshSearch,
+    _together,
+    default_transcription,
+    guessed_elements,
+    search_meshes,
+    swinging_elements,
+)
 from problems import Problem, load
 from problems.cases.standard import published
 from transcription import DFET, parse
@@ -262,6 +271,45 @@ def found_for(problem: Problem, wanted: Wanted, coarse=COARSE, most_work: float 
 
 
 PLAIN = Wanted(1e-3, 1e-3, 1e-3, 1e-3)
+
+
+def oscillators(speeds: np.ndarray, pushes: np.ndarray, start: np.ndarray, duration: float) -> tuple[Problem, float]:
+    """Oscillators that one force brings to rest in 0.3 to 1 of a duration; and the least effort, for the whole of it, by the Gramian of
+    controllability: a longer time never takes more."""
+    k, problem = len(speeds), Problem("oscillators")
+    run = problem.phase("run", t0=0, tf=(0.3 * duration, duration))
+    x = [run.state(f"x{i}", bounds=(-9, 9), initial=start[i], final=0) for i in range(k)]
+    v = [run.state(f"v{i}", bounds=(-9, 9), initial=0, final=0) for i in range(k)]
+    u = run.control("u", bounds=(-2, 2))
+    rates = {f"v{i}": -(speeds[i] ** 2) * x[i] + pushes[i] * u for i in range(k)}
+    run.dynamics(**{f"x{i}": v[i] for i in range(k)}, **rates)
+    problem.minimize("effort", run.integral(u**2))
+    problem.minimize("time", run.tf)
+    # From rest backwards: the state that a push at time t makes up for is of frequencies w: (sin wt / w, -cos wt).
+    t = (np.arange(20_000) + 0.5) * duration / 20_000
+    columns = pushes[:, None] * np.vstack([np.sin(speeds[:, None] * t) / speeds[:, None], -np.cos(speeds[:, None] * t)]).reshape(2, k, -1)
+    columns = columns.reshape(2 * k, -1)
+    begun = np.append(start, 0.0 * start)
+    return problem, float(begun @ np.linalg.solve(columns @ columns.T * duration / 20_000, begun))
+
+
+@pytest.mark.slow
+@given(st.integers(0, 10**6), st.integers(1, 4), st.floats(20.0, 40.0))
+@settings(max_examples=3)
+def test_the_least_effort_of_long_oscillations_is_that_of_the_gramian(seed, k, duration):
+    rng = np.random.default_rng(seed)
+    speeds = 0.4 + 0.5 * np.arange(k) + 0.2 * rng.random(k)
+    problem, least = oscillators(speeds, rng.choice([-1, 1], k) * rng.uniform(0.5, 1.5, k), rng.uniform(-1, 1, k), duration)
+    found = optimize(problem)
+    assert found.status == "converged" and found.objectives["effort"] == pytest.approx(least, rel=1e-3)
+
+
+def test_elements_for_oscillations_of_linear_dynamics():
+    problem, _ = oscillators(np.array([0.5, 1.5]), np.ones(2), np.ones(2), 40.0)
+    assert swinging_elements(problem.compile()) == np.ceil(1.5 * 40.0 / SEARCH.angle)
+    assert swinging_elements(layered(0.1).compile()) == 0, "dynamics are not linear"
+    problem, _ = oscillators(np.array([9.0]), np.ones(1), np.ones(1), 100.0)
+    assert swinging_elements(problem.compile()) == SEARCH.elements
 
 
 @pytest.mark.slow
