@@ -79,9 +79,6 @@ def is_case(path: Path) -> bool:
     return path.is_relative_to(ROOT / "problems" / "cases")
 
 
-NUMBERS = [number for path in ROOMS if not is_case(path) for number in named_numbers(path)]
-
-
 def test_no_folder_has_more_than_14_modules():
     counts = Counter(path.parent.relative_to(ROOT) for path in ROOMS)
     assert {str(folder): count for folder, count in counts.items() if count > 14} == {}
@@ -92,37 +89,26 @@ def test_modules_have_one_idea():
     assert {name: count for name, count in sizes.items() if not 80 <= count <= 700} == {}
 
 
-def test_the_weight_of_the_floors():
+def test_the_weight_of_floors_and_tests_and_the_count_of_numbers_with_a_name():
+    assert sum(map(lines, TESTS)) <= OF_TESTS
     assert sum(map(lines, MODULES)) <= LINES
     assert sum(map(code, MODULES)) <= CODE
     assert len(ROOMS) <= 300
-
-
-def test_the_weight_of_the_tests():
-    assert sum(map(lines, TESTS)) <= OF_TESTS
-
-
-def test_numbers_with_a_name():
+    numbers = [number for path in ROOMS if not is_case(path) for number in named_numbers(path)]
     fields = sum(
         isinstance(node, ast.AnnAssign) and is_number(node.value)
         for path, one in classes()
         if not is_case(path) and any("dataclass" in ast.unparse(each) for each in one.decorator_list)
         for node in one.body
     )
-    assert len(NUMBERS) <= 200
-    assert len(NUMBERS) + fields <= 400
-
-
-def test_a_number_has_one_value():
+    assert len(numbers) <= 200
+    assert len(numbers) + fields <= 400
     values = defaultdict(set)
-    for name, value in NUMBERS:
+    for name, value in numbers:
         values[name].add(value)
-    assert {name: found for name, found in values.items() if len(found) > 1} == {}
-
-
-def test_a_class_name_is_one_idea():
+    assert {name: found for name, found in values.items() if len(found) > 1} == {}, "a number has one value"
     counts = Counter(one.name for _, one in classes())
-    assert {name for name, count in counts.items() if count > 1} <= TWICE
+    assert {name for name, count in counts.items() if count > 1} <= TWICE, "a class name is one idea"
 
 
 def test_macs_has_few_settings():

@@ -12,8 +12,6 @@ import pytest
 
 FOLDER = Path(__file__).parents[1] / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-SLOW = ("2-phases-and-staging", "3-tables-and-peaks", "4-choosing", "5-a-study", "6-shape-and-trajectory")
-"""All but the first, since together they take two minutes."""
 
 
 def cells(path: Path) -> list[dict[str, Any]]:
@@ -28,7 +26,8 @@ def run(source: str, space: dict[str, Any], name: str) -> Any:
     return eval(compile(ast.Expression(last.value), name, "eval"), space) if last else None
 
 
-@pytest.mark.parametrize("path", [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in SLOW), id=path.stem) for path in NOTEBOOKS])
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     space: dict[str, Any] = {"__name__": "__notebook__"}
@@ -43,13 +42,10 @@ def test_a_notebook_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert shown, "no cell shows a front, a point or a study"
 
 
-def test_there_are_six():
-    assert len(NOTEBOOKS) == 6 and set(SLOW) <= {path.stem for path in NOTEBOOKS}
-
-
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebooks_are_kept_without_results(path: Path):
-    """Of format 4.5, each cell with an id of its own; it begins with a title."""
+    """Of format 4.5, each cell with an id of its own; it begins with a title. There are six."""
+    assert len(NOTEBOOKS) == 6
     whole = json.loads(path.read_text(encoding="utf-8"))
     assert (whole["nbformat"], whole["nbformat_minor"]) == (4, 5) and set(whole) == {"cells", "metadata", "nbformat", "nbformat_minor"}
     assert whole["cells"][0]["cell_type"] == "markdown" and whole["cells"][0]["source"][0].startswith("# ")

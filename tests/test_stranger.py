@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -38,21 +39,18 @@ print(check.defect["ascent"], check.violation)                         # per sta
 """
 
 
+@pytest.mark.slow
 def test_the_script_of_the_face_runs_as_it_stands(tmp_path):
     code = LUNAR.replace("EVALUATIONS", "150") + (
         "assert len(flight['ascent'].time) == len(flight['ascent']['y']) and len(flight['ascent'].at(50.0)) == 5\n"
         "assert (front.objectives[:, 0] >= 109.08).all() and (front.violation <= 1e-6).all()\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=headless(), capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env={**os.environ, "MPLBACKEND": "Agg"}, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert "flight time" in done.stdout and "horizontal speed" in done.stdout and "'vy'" in done.stdout
     assert (tmp_path / "ascent.nc").is_file() and [path.name for path in tmp_path.iterdir()] == ["ascent.nc"]
-
-
-def headless() -> dict[str, str]:
-    import os
-
-    return {**os.environ, "MPLBACKEND": "Agg"}
 
 
 def rocket() -> Problem:
@@ -86,7 +84,7 @@ def rocket() -> Problem:
 
 @pytest.fixture(scope="module")
 def front() -> Front:
-    return MACS(agents=6, archive=6).solve(rocket(), DFET(elements=4, order=4, basis="bernstein"), evaluations=300, seed=3)
+    return MACS(agents=6, archive=6).solve(rocket(), DFET(elements=4, order=4, basis="bernstein"), evaluations=120, seed=3)
 
 
 def test_a_strangers_problem_is_solved(front):
@@ -94,11 +92,8 @@ def test_a_strangers_problem_is_solved(front):
     assert front.names == ("apogee", "fuel") and front.senses == ("maximize", "minimize") and front.units == ("km", "t")
     assert (np.diff(front.objectives[:, 0]) > 0).all() and (np.diff(front.objectives[:, 1]) > 0).all(), "sorted, and a trade-off"
     assert (front.violation <= 1e-6).all() and set(front.status) == {"converged"}
-    assert front.stats["evaluations"] <= 300 and front.stats["seed"] == 3
+    assert front.stats["evaluations"] <= 120 and front.stats["seed"] == 3
     assert np.array_equal(front.F, front.objectives * [-1, 1])
-
-
-def test_every_point_of_it_flies(front):
     for point in front:
         flight, check = point.trajectory, point.simulate()
         assert list(flight) == ["burn", "coast"]
@@ -151,9 +146,6 @@ def test_dynamics_that_never_work_give_an_empty_front_not_a_crash():
     problem.maximize("way", run.final(x))
     front = MACS(agents=4, archive=4).solve(problem, DFET(2, 2), evaluations=20, seed=1)
     assert len(front) == 0 and front.message and front.stats["failures"] == {"failed": 20}
-
-
-def test_a_wrong_statement_costs_no_evaluation():
     problem = Problem("wrong")
     run = problem.phase("run", t0=0, tf=(1, 2))
     x = run.state("x", bounds=(-1, 1))

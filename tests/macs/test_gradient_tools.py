@@ -57,6 +57,8 @@ def test_goddard_points_are_evenly_spread() -> None:
     span = np.ptp(front.F, axis=0)
     steps = np.diff((front.F / span) @ [1, -1])
     assert steps == pytest.approx(np.full(9, 2 / 9), abs=1e-6)
+    begun = sweep(load("goddard"), DFET(4, 6), points=6, start=goddard(), starts=1)
+    assert len(begun) == 6 and begun.stats["inner_iterations"] < goddard().stats["inner_iterations"]
 
 
 @pytest.mark.slow
@@ -124,9 +126,6 @@ def test_payoff_is_lexicographic_in_the_declared_order() -> None:
     assert ends.objectives[0] == pytest.approx([20, -0.28345966], abs=1e-6)
     assert ends.objectives[1] == pytest.approx([80, 0.05342372], abs=1e-6)
     assert certificates(ends).max() < 1e-6
-
-
-def test_ends_of_smooth_fronts_are_not_rounded_off() -> None:
     # Where a front is steep, a slack of 1e-9 in one objective would be 3e-5 in the other.
     ends = payoff(slide(), MESH, starts=1)
     assert ends.objectives == pytest.approx(np.array([[0, 1], [0.5, 0]]), abs=1e-6)
@@ -166,11 +165,6 @@ def test_the_same_seed_gives_the_same_bits_and_the_costs() -> None:
     assert one.stats["gradient_solves"] == two.stats["gradient_solves"] >= 2 * (2 * 2 + 2)
     assert one.stats["inner_iterations"] > one.stats["gradient_solves"] and one.stats["wall_time"] > 0 and one.stats["reproducible"]
     assert isinstance(sweep(shuttle(), MESH, points=3, starts=1, seed=None).stats["seed"], int)
-
-
-def test_a_front_is_a_start_for_another() -> None:
-    begun = sweep(load("goddard"), DFET(4, 6), points=6, start=goddard(), starts=1)
-    assert len(begun) == 6 and begun.stats["inner_iterations"] < goddard().stats["inner_iterations"]
 
 
 # What is not there
@@ -243,6 +237,6 @@ def test_targets_are_even_and_no_more_than_asked() -> None:
 def test_importing_stays_light() -> None:
     code = (
         "import sys; from macs import *; NSGA3(divisions=4), SMSEMOA(), RVEA(), CTAEA();"
-        "print([m for m in ('matplotlib', 'xarray', 'scipy.stats', 'pymoo') if m in sys.modules])"
+        "print([m for m in ('matplotlib', 'xarray', 'pandas', 'h5netcdf', 'scipy.stats', 'pymoo') if m in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"

@@ -184,10 +184,6 @@ def test_a_time_limit_ends_a_simulation(endless_integrations):
     front = stiff_front()
     with Interrupts(LIMIT), within(BOUND), pytest.raises(Stopped, match="time limit"):
         simulate(front.compiled(), front[0].trajectory)
-
-
-def test_points_whose_simulation_is_cut_short_are_not_verified_and_not_lost(endless_integrations):
-    front = stiff_front()
     with Interrupts(LIMIT), within(BOUND):
         found = front.verify(1e-3)
     assert len(found) == 2 and not found.was_simulated.any() and not found.verified.any()

@@ -116,14 +116,15 @@ def test_the_paper_is_the_same_too():
     assert np.array_equal(ordered(res.X, res.F), of(front)) and len(res.history) == res.algorithm.n_gen - 1
 
 
-def test_a_preference_of_other_objectives_is_refused():
-    with pytest.raises(ValueError, match="MACS: prefer"):
-        minimize(get_problem("zdt1"), MACS(prefer=ReferencePoint({"mass": 0.2})), ("n_eval", 100))
-
-
-def test_by_default_there_are_as_many_points_as_in_a_population_of_pymoo():
+def test_the_size_of_the_archive_and_what_it_may_not_be():
     assert len(minimize(get_problem("bnh"), MACS(), ("n_eval", 1_500), seed=1).F) == 100 == NSGA2().pop_size
     assert MACS.paper().search.archive == macs.MACS.paper().archive
+    res = minimize(get_problem("dtlz2", n_obj=6), MACS(archive=40), ("n_eval", 1_000), seed=1)
+    assert res.F.shape == (40, 6) and np.linalg.norm(res.F, axis=1).min() >= 1 - 1e-12
+    with pytest.raises(ValueError, match="archive must have at least one point for each of the 6 objectives"):
+        minimize(get_problem("dtlz2", n_obj=6), MACS(archive=5), ("n_eval", 100))
+    with pytest.raises(ValueError, match="MACS: prefer"):
+        minimize(get_problem("zdt1"), MACS(prefer=ReferencePoint({"mass": 0.2})), ("n_eval", 100))
 
 
 def test_without_a_budget_it_is_the_search_without_one():
@@ -131,13 +132,6 @@ def test_without_a_budget_it_is_the_search_without_one():
     macs.MACS(archive=15).minimize(get_problem("zdt3"), seed=4, callback=lambda progress: seen.append(progress.F) or len(seen) == 12)
     res = minimize(get_problem("zdt3"), MACS(archive=15), ("n_gen", 13), seed=4)
     assert np.array_equal(res.F, seen[-1]) and res.algorithm.n_gen == 14
-
-
-def test_many_objectives():
-    res = minimize(get_problem("dtlz2", n_obj=6), MACS(archive=40), ("n_eval", 1_000), seed=1)
-    assert res.F.shape == (40, 6) and np.linalg.norm(res.F, axis=1).min() >= 1 - 1e-12
-    with pytest.raises(ValueError, match="archive must have at least one point for each of the 6 objectives"):
-        minimize(get_problem("dtlz2", n_obj=6), MACS(archive=5), ("n_eval", 100))
 
 
 @pytest.mark.slow
@@ -230,6 +224,8 @@ def test_results_have_populations():
     X, F, G = res.opt.get("X", "F", "G")
     expected = res.problem.evaluate(X, return_values_of=["F", "G"])
     assert np.array_equal(F, expected[0]) and np.array_equal(G, expected[1]) and np.array_equal(F, res.F)
+    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 400), seed=1, archive=MultiObjectiveArchive())
+    assert {F.tobytes() for F in res.F} <= {F.tobytes() for F in res.archive.get("F")}
 
 
 def test_verbose_prints_pymoos_columns(capsys):
@@ -240,11 +236,6 @@ def test_verbose_prints_pymoos_columns(capsys):
     assert "f_min" in capsys.readouterr().out
     minimize(get_problem("sphere"), MACS(), ("n_gen", 2), seed=1)
     assert capsys.readouterr().out == ""
-
-
-def test_an_archive_of_pymoo_collects_what_was_evaluated():
-    res = minimize(get_problem("zdt1"), MACS(), ("n_eval", 400), seed=1, archive=MultiObjectiveArchive())
-    assert {F.tobytes() for F in res.F} <= {F.tobytes() for F in res.archive.get("F")}
 
 
 # Copies
@@ -441,7 +432,7 @@ def test_what_is_feasible_is_in_the_individuals_config(monkeypatch):
 # What is refused
 
 
-def test_only_real_variables_with_bounds():
+def test_only_real_variables_with_bounds_settings_of_the_algorithm_and_constraints_that_stay():
     class Mixed(ElementwiseProblem):
         def __init__(self) -> None:
             super().__init__(vars={"a": Real(bounds=(0, 1)), "b": Binary()}, n_obj=1)
@@ -457,6 +448,11 @@ def test_only_real_variables_with_bounds():
             minimize(problem, MACS(), ("n_eval", 10))
         with pytest.raises(ValueError, match=message):
             macs.NSGA2(population=4).minimize(problem, evaluations=10)
+    for name, value in {"agents": 20, "archive": 50}.items():
+        with pytest.raises(ValueError, match=rf"{name} is a setting of the algorithm: MACS\({name}={value}\)"):
+            minimize(get_problem("zdt1"), MACS(), ("n_eval", 10), **{name: value})
+    with pytest.raises(ValueError, match="may not change"):
+        minimize(get_problem("bnh"), AdaptiveEpsilonConstraintHandling(MACS()), ("n_eval", 10))
 
 
 def test_settings_are_refused_as_those_of_macs():
@@ -472,14 +468,3 @@ def test_settings_are_refused_as_those_of_macs():
         with pytest.raises(ValueError, match="does not apply, since 'ZDT1' is a vector problem"):
             minimize(get_problem("zdt1"), MACS(**setting), ("n_eval", 10))
     minimize(get_problem("zdt1"), MACS(refine=False, mesh="fixed", ceiling=5), ("n_eval", 10))
-
-
-def test_settings_belong_to_the_algorithm():
-    for name, value in {"agents": 20, "archive": 50}.items():
-        with pytest.raises(ValueError, match=rf"{name} is a setting of the algorithm: MACS\({name}={value}\)"):
-            minimize(get_problem("zdt1"), MACS(), ("n_eval", 10), **{name: value})
-
-
-def test_constraints_that_change_are_refused():
-    with pytest.raises(ValueError, match="may not change"):
-        minimize(get_problem("bnh"), AdaptiveEpsilonConstraintHandling(MACS()), ("n_eval", 10))

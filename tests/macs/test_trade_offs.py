@@ -10,14 +10,7 @@ from smooth_problems import nlp_of, shuttle, slide, still, two_wells, vector
 from synthetic_fronts import black_box
 
 from macs import Front, optimize, sweep
-from macs.decisions import (
-    Ranges,
-    WeightedSum,
-    decide,
-    front_rates,
-    plot_rates,
-    trade_offs,
-)
+from macs.decisions import Ranges, WeightedSum, decide, front_rates, plot_rates, trade_offs
 from macs.decisions.trade_offs import TradeOffs, rates
 from macs.fronts.builders import from_vectors
 from problems import Problem, load
@@ -222,9 +215,6 @@ def test_at_a_corner_the_rates_of_both_sides_are_said():
     # Within a face all weights are known.
     flat = faces((2.0, 1.0))
     assert flat.bounds("J1", "J0") == pytest.approx((-2.0, -2.0), rel=1e-3) and not flat.messages
-
-
-def test_at_an_edge_of_three_objectives_the_rates_of_both_sides_are_said():
     found = faces((1.0, 1.0, 2.0), (2.0, 1.0, 1.0))
     assert found.bounds("J0", "J2") == pytest.approx((-2.0, -0.5), rel=1e-3)
     assert found.bounds("J0", "J1") == pytest.approx((-1.0, -0.5), rel=1e-3)
@@ -459,7 +449,7 @@ def test_a_choice_knows_what_it_costs():
 # Tables and pictures.
 
 
-def test_a_table_has_what_one_unit_costs(ascents):
+def test_tables_and_pictures_of_points(ascents):
     found = trade_offs(ascents[5])
     lines = found.table().split("\n")
     (row,) = (line for line in lines if line.startswith("flight time"))
@@ -471,9 +461,6 @@ def test_a_table_has_what_one_unit_costs(ascents):
     rows = [line.split() for line in found.table().split("\n") if line.startswith("distance")]
     assert rows[0][1:] == [f"{found.rate(0, 2):+.4g}", f"{found.rate(1, 2):+.4g}", "+1"]
     assert rows[1][1:] == [f"{found.matrix[2, 0]:+.4g}", f"{found.matrix[2, 1]:+.4g}", "+1"]
-
-
-def test_pictures_of_points(ascents):
     assert [ax.get_title(loc="left") for ax in trade_offs(ascents[5]).plot()] == ["along the front, the rest held"]
     axes = trade_offs(optimum(carts(), parse(MESH), 2.0, 1.5)[0]).plot()
     assert len(axes) == 2

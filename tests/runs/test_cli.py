@@ -7,12 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from synthetic_fronts import flights
 
 import macs
 from macs import Front
 from problems import names
 from runs.batch import file as studyfile
 from runs.cli import main
+from runs.cli.commands import make_solver
 
 MACS = [sys.executable, "-m", "runs.cli"]
 SCRIPT = """
@@ -132,8 +134,7 @@ def test_a_problem_of_ones_own_needs_no_option_and_overwrites_nothing(capsys, re
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("method", "exceeded"),
-    [("shooting:6:linear", ""), ("radau:2x3", ""), ("multiple-shooting:4x2:kutta3:spline:3", "bounds of leg.u")],
+    ("method", "exceeded"), [("shooting:6:linear", ""), ("radau:2x3", ""), ("multiple-shooting:4x2:kutta3:spline:3", "bounds of leg.u")]
 )
 def test_other_transcriptions_are_solved_shown_and_verified(capsys, method, exceeded):
     """A spline leaves its bounds between nodes."""
@@ -185,9 +186,7 @@ def test_how_much_points_may_miss_is_of_the_problem_or_of_the_call(capsys):
     assert main(["show", "front.nc", "--point", "1"]) == 0 and "verified" not in capsys.readouterr().out
 
 
-def test_an_adaptive_mesh_and_no_derivatives_are_what_the_solver_gets(monkeypatch):
-    from runs.cli.commands import make_solver
-
+def test_an_adaptive_mesh_and_no_derivatives_are_what_the_solver_gets():
     assert make_solver("macs") == macs.MACS()
     assert make_solver("MACS", plain=True, mesh="adaptive") == macs.MACS(refine=False, mesh="adaptive")
     assert make_solver("macs", polish_on="dfet:8x3") == macs.MACS(polish_on="dfet:8x3")
@@ -208,7 +207,6 @@ def test_nothing_feasible_is_a_no_and_still_a_file(capsys):
         (["solve", "godard"], ["'godard'", "did you mean 'goddard'", "orbit_rise"]),
         (["solve", "goddard", "--solver", "mcas"], ["'mcas'", "did you mean macs?"]),
         (["solve", "goddard", "--transcription", "dfet:4"], ["'dfet:4'", "dfet:4x6"]),
-        (["solve", "goddard", "--transcription", "shot:4x4"], ["'shot:4x4'", "dfet:4x6"]),
         (["solve", "goddard", "--transcription", "shooting:9:cubic"], ["'cubic'", "constant, linear, spline", "rk4"]),
         (["solve", "goddard", "--transcription", "shooting:1"], ["nodes must be a whole number of at least 2"]),
         (["solve", "glide.py:lagging", "--transcription", "shooting:20"], ["'leg'", "'x'", "rk4", "nodes=", "steps="]),
@@ -360,12 +358,12 @@ def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, refused, monkeypatc
 # Looking at what was saved
 
 
-def test_show_prints_draws_and_exports(saved, capsys):
-    path = str(saved[0] / "front.nc")
-    assert main(["show", path, "--plot", "a.pdf", "--csv", "a.csv"]) == 0
+def test_show_prints_draws_and_exports(capsys):
+    flights(3).save("front.nc")
+    assert main(["show", "front.nc", "--plot", "a.pdf", "--csv", "a.csv"]) == 0
     out = capsys.readouterr().out
-    assert "flight time" in out and "picture in a.pdf" in out and "values in a.csv" in out
-    assert Path("a.pdf").read_bytes().startswith(b"%PDF") and Path("a.csv").read_text().startswith("point,flight time [s],")
+    assert "height" in out and "picture in a.pdf" in out and "values in a.csv" in out
+    assert Path("a.pdf").read_bytes().startswith(b"%PDF") and Path("a.csv").read_text().startswith("point,time [s],height [km]")
 
 
 @pytest.mark.slow

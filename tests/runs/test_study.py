@@ -77,9 +77,6 @@ def test_every_run_leaves_its_front_its_seed_and_how_it_converged(made):
         assert {len(column) for column in run.history.values()} == {len(counts)}
         assert run.wall_time > 0 and run.history["elapsed"][-1] <= run.wall_time
     assert not list(folder.rglob("*.part"))
-
-
-def test_a_run_is_what_solve_gives_for_its_seed(made):
     run = made[1].runs[1]
     front = Plain().solve(glide(), DFET(2, 2), evaluations=60, seed=run.seed)
     assert np.array_equal(front.F, run.front.F)
@@ -131,9 +128,6 @@ def test_seeds_depend_on_labels_and_number_alone():
     assert len(seeds) == 4 * 9 and all(0 <= seed < 2**63 for seed in seeds)
     assert one.seed(1, 1) != one.seed(2, 1)
     assert one.seed(1, 1) == 9144903288234304347
-
-
-def test_the_same_transcription_has_the_same_label_however_it_is_given():
     for given in (None, "dfet:2x2", DFET(2, 2), [DFET(2, 2)], {"glide": DFET(2, 2)}):
         assert study(transcriptions=given).cells[0].labels == ("glide", "dfet:2x2", "plain")
 

@@ -147,16 +147,15 @@ def test_ends_of_intervals_converge_with_the_order_of_the_method(points, degree,
     scale = phase.control("u", bounds=(0, 2))
     phase.dynamics(x=y, y=-x - 0.5 * y + scale * ca.cos(3 * phase.time))
     problem.minimize("end", phase.final(x))
-    exact = solve_ivp(
-        lambda t, x: [x[1], -x[0] - 0.5 * x[1] + np.cos(3 * t)], (0, 4), [1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-14
-    ).y[:, -1]
+    rates = lambda t, x: [x[1], -x[0] - 0.5 * x[1] + np.cos(3 * t)]  # noqa: E731
+    exact = solve_ivp(rates, (0, 4), [1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     errors = []
-    for intervals in (6, 12, 24) if degree > 1 else (64, 128, 256):
+    for intervals in (12, 24) if degree > 1 else (128, 256):
         nlp = Collocation(intervals, degree, points=points).transcribe(problem)
         z = nlp.propagate(nlp.first_guess(np.ones((1, len(nlp.free)))))
         assert nlp.evaluate(z)[1] < 1e-12
         errors.append(np.linalg.norm(nlp.unpack(z[0])["run"].edge_states[-1] - exact))
-    assert np.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.25)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.25)
 
 
 def rise() -> Problem:

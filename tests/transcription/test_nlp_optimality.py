@@ -32,12 +32,11 @@ def test_between_the_wells_only_the_distance_from_the_line_is_left(p: float, q: 
     assert at(nlp_of(two_wells()), p=p, q=q) == pytest.approx(2 * abs(q) * SPAN, abs=1e-12)
 
 
-def test_beyond_a_well_its_own_gradient_is_the_least() -> None:
+def test_beyond_a_well_at_a_bound_in_other_scales_and_with_equations_twice() -> None:
     assert at(nlp_of(two_wells()), p=1.5, q=0.0) == pytest.approx(2 * 0.5 * SPAN)
     assert at(nlp_of(two_wells()), p=-0.25, q=0.0) == pytest.approx(2 * 0.25 * SPAN)
-
-
-def test_objectives_are_measured_in_the_scales_given() -> None:
+    assert at(nlp_of(two_wells(q=(0.5, 2.0))), p=0.3, q=0.5) == pytest.approx(0, abs=1e-12)
+    assert at(nlp_of(two_wells(q=(-2.0, 0.5))), p=0.3, q=0.5) == pytest.approx(2 * 0.5 * 2.5)
     nlp = nlp_of(two_wells())
     z = vector(nlp, p=0.5, q=0.25)
     assert optimality(nlp, z, np.array([10.0, 10.0])) == pytest.approx(0.1 * optimality(nlp, z, np.ones(2)))
@@ -45,14 +44,6 @@ def test_objectives_are_measured_in_the_scales_given() -> None:
     assert optimality(nlp, vector(nlp, p=0.5, q=0.0), np.array([1e-3, 50.0])) == pytest.approx(0, abs=1e-9)
     # A range of zero, of an objective that does not vary over a front, stands for its own scale.
     assert 0 < optimality(nlp, z, np.zeros(2)) == pytest.approx(optimality(nlp, z))
-
-
-def test_a_bound_takes_the_rest_from_its_own_side_only() -> None:
-    assert at(nlp_of(two_wells(q=(0.5, 2.0))), p=0.3, q=0.5) == pytest.approx(0, abs=1e-12)
-    assert at(nlp_of(two_wells(q=(-2.0, 0.5))), p=0.3, q=0.5) == pytest.approx(2 * 0.5 * 2.5)
-
-
-def test_equations_that_say_the_same_twice() -> None:
     problem = two_wells()
     for factor in (1, 2):
         problem.constraint(f"wall {factor}", factor * problem.parameters["q"], lower=0.5 * factor, upper=0.5 * factor)

@@ -56,26 +56,17 @@ def solve(nlp: NLP, reference: list[float], weights: list[float], start: np.ndar
     return scalarize(nlp, first, reference=np.array(reference), weights=np.array(weights), **more)  # type: ignore[arg-type]
 
 
-def test_pascoletti_serafini_goes_to_the_front_along_the_weights() -> None:
+def test_scalarisations_go_along_weights_to_hard_limits_and_below_ceilings() -> None:
     # Along the diagonal from (0, 0): p^2 = (p - 1)^2.
     solved = solve(nlp_of(two_wells()), [0, 0], [1, 1])
     assert solved.status == "converged" and solved.violation <= 1e-6
     assert close(solved, [0.25, 0.25], 1e-8)
     steep = solve(nlp_of(two_wells()), [0, 0], [1, 4])
     assert close(steep, [1 / 9, 4 / 9], 1e-8)
-
-
-def test_a_weight_of_zero_is_a_hard_limit() -> None:
     solved = solve(nlp_of(two_wells()), [0, 0.36], [1, 0])
     assert solved.status == "converged" and close(solved, [0.16, 0.36], 1e-8)
-
-
-def test_an_infinite_reference_leaves_an_objective_out() -> None:
     solved = solve(nlp_of(two_wells()), [INF, 0], [1, 1])
     assert solved.status == "converged" and close(solved, [1, 0], 1e-7)
-
-
-def test_a_ceiling_holds_beside_the_scalarisation() -> None:
     solved = solve(nlp_of(two_wells()), [0, 0], [1, 1], ceiling=np.array([INF, 0.04]))
     assert solved.status == "converged" and close(solved, [0.64, 0.04], 1e-7)
 

@@ -33,22 +33,14 @@ def test_instructions_and_variables_grow_with_the_mesh(word):
     """From meshes on that are long enough for chains of steps, which are shorter to write than their operations."""
     first = 300 if word.startswith("shooting") else 150
     nlps = [parse(word.format(n)).transcribe(load("goddard")) for n in (first, 2 * first, 4 * first)]
-    for count in (
-        lambda nlp: len(nlp.variables),
-        lambda nlp: work(nlp.functions),
-        lambda nlp: nlp.reduced.instructions,
-    ):
+    for count in (lambda nlp: len(nlp.variables), lambda nlp: work(nlp.functions), lambda nlp: nlp.reduced.instructions):
         assert power([count(nlp) for nlp in nlps]) < ASKED
 
 
 @pytest.mark.parametrize("word", SPARSE[:-1])
 def test_derivatives_grow_with_the_mesh(word):
     nlps = [parse(word.format(n)).transcribe(load("goddard")) for n in (50, 100, 200)]
-    for entries in (
-        lambda nlp: gradients(nlp).nnz_out(1),
-        lambda nlp: hessian(nlp).nnz_out(0),
-        lambda nlp: work(gradients(nlp)),
-    ):
+    for entries in (lambda nlp: gradients(nlp).nnz_out(1), lambda nlp: hessian(nlp).nnz_out(0), lambda nlp: work(gradients(nlp))):
         assert power([entries(nlp) for nlp in nlps]) < ASKED
 
 

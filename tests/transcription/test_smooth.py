@@ -79,16 +79,7 @@ def test_smoothing_keeps_the_variance_and_a_short_length_everything() -> None:
     assert (smoothing(places, 0.2) ** 2).sum(axis=1) == pytest.approx(1)
     assert smoothing(places, 1e-4) == pytest.approx(np.eye(4))
     assert smoothing(places, 1e4) == pytest.approx(np.full((4, 4), 0.5))
-
-
-@pytest.mark.parametrize("settings", [{"spread": 0}, {"spread": 1.5}, {"length": -1}, {"length": "long"}, {"spread": True}, {"guess": 1}])
-def test_settings_that_make_no_sense(settings) -> None:
-    with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be"):
-        Smooth(**settings)
-
-
-def test_profiles_at_many_places_are_those_of_the_whole_matrix() -> None:
-    """They are interpolated, also where places lie close to each other, and are no different."""
+    # They are interpolated, also where places lie close to each other, and are no different.
     rng = np.random.default_rng(0)
     places = np.sort(np.concatenate([np.linspace(0.0, 1.0, 1200), 0.3 + 0.01 * rng.random(800)]))
     noise = rng.standard_normal((3, len(places)))
@@ -96,6 +87,12 @@ def test_profiles_at_many_places_are_those_of_the_whole_matrix() -> None:
         assert np.allclose(smoothed(noise, places, length), noise @ smoothing(places, length).T, rtol=0, atol=1e-6)
     few = places[::4]
     assert np.array_equal(smoothed(noise[:, ::4], few, 0.2), noise[:, ::4] @ smoothing(few, 0.2).T)
+
+
+@pytest.mark.parametrize("settings", [{"spread": 0}, {"spread": 1.5}, {"length": -1}, {"length": "long"}, {"spread": True}, {"guess": 1}])
+def test_settings_that_make_no_sense(settings) -> None:
+    with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be"):
+        Smooth(**settings)
 
 
 # Solvers that begin with them

@@ -46,13 +46,6 @@ def test_the_three_ways_by_hand(handling, expected, beyond):
     assert all(np.array_equal(one, other) for one, other in zip(doubled, same, strict=True))
 
 
-def test_what_failed_is_violated_infinitely_whichever_of_its_numbers_is_missing():
-    F = np.array([[1.0, 2.0], [np.nan, 2.0], [1.0, 2.0], [1.0, 2.0], [np.inf, 2.0]])
-    violation = np.array([0.5, 0.5, np.nan, np.inf, 0.0])
-    assert excess(F, violation, 1e-6).tolist() == [0.5, np.inf, np.inf, np.inf, np.inf]
-    assert excess(F, violation, 1e-6, np.full(5, 3.0)).tolist() == [3.0, np.inf, np.inf, np.inf, np.inf]
-
-
 # Degrees
 
 
@@ -70,7 +63,7 @@ def test_a_heating_rate_and_a_pressure_by_hand() -> None:
     assert by("printed").tolist() == pytest.approx([0.25, 0.75, 2.0, 2.0])  # eq. (16) saturates at twice the limit
 
 
-def test_what_is_within_the_tolerance_or_failed():
+def test_what_failed_or_is_no_number_is_violated_infinitely_and_what_is_within_the_tolerance_not():
     v = np.array([[5e-7, 0.3], [5e-7, 1e-7], [np.nan, 0.1], [np.inf, 0.1]])
     worst = np.array([0.3, 5e-7, np.inf, np.inf])
     for name in DEGREES[1:]:
@@ -78,6 +71,15 @@ def test_what_is_within_the_tolerance_or_failed():
         assert found[0] == pytest.approx(np.log1p(0.3) if name == "log" else 0.3)
         assert found[1] == 0
         assert np.isinf(found[2:]).all()
+    violation = np.array([1.0, 1.0, 1.0, np.inf])
+    for name in ("sum", "log"):
+        found = degree(name, violation, lambda: np.array([[np.nan, 0.0], [np.inf, 0.0], [1.0, 1.0], [1.0, 1.0]]), 1e-6)
+        assert found[[0, 1, 3]].tolist() == [np.inf] * 3 and found[2] == pytest.approx(2.0 if name == "sum" else 2.0 * np.log(2.0))
+    assert degree("sum", violation[:1], lambda: np.array([[1e-6, 2e-6]]), 1e-6).tolist() == [2e-6]
+    F = np.array([[1.0, 2.0], [np.nan, 2.0], [1.0, 2.0], [1.0, 2.0], [np.inf, 2.0]])
+    violation = np.array([0.5, 0.5, np.nan, np.inf, 0.0])
+    assert excess(F, violation, 1e-6).tolist() == [0.5, np.inf, np.inf, np.inf, np.inf]
+    assert excess(F, violation, 1e-6, np.full(5, 3.0)).tolist() == [3.0, np.inf, np.inf, np.inf, np.inf]
 
 
 @given(arrays(float, (5, 3), elements=AMOUNTS), st.sampled_from(DEGREES))
@@ -88,14 +90,6 @@ def test_a_degree_is_none_exactly_where_a_point_is_feasible_and_never_falls_with
     assert (more >= found).all()
     if name in ("sum", "log"):
         assert (more > found).all()
-
-
-def test_a_constraint_that_is_no_number_is_violated_infinitely():
-    violation = np.array([1.0, 1.0, 1.0, np.inf])
-    for name in ("sum", "log"):
-        found = degree(name, violation, lambda: np.array([[np.nan, 0.0], [np.inf, 0.0], [1.0, 1.0], [1.0, 1.0]]), 1e-6)
-        assert found[[0, 1, 3]].tolist() == [np.inf] * 3 and found[2] == pytest.approx(2.0 if name == "sum" else 2.0 * np.log(2.0))
-    assert degree("sum", violation[:1], lambda: np.array([[1e-6, 2e-6]]), 1e-6).tolist() == [2e-6]
 
 
 # Solvers

@@ -133,8 +133,7 @@ def test_so_are_fronts() -> None:
     front = NSGA2().minimize(problem, evaluations=500, seed=5)
     assert np.array_equal(front.F, np.unique(truth.F, axis=0))
     assert front.stats["evaluations"] == 500 == truth.algorithm.evaluator.n_eval
-    assert front.stats["stopped"] == "budget"
-    assert front.stats["reproducible"]
+    assert front.stats["stopped"] == "budget" and front.stats["reproducible"]
 
 
 @pytest.mark.slow
@@ -204,8 +203,7 @@ def test_the_budget_is_met_exactly(settings: Any, budget: int) -> None:
     rows: list[int] = []
     front = settings.minimize(lambda X: rows.append(len(X)) or schaffer(X), CUBE, evaluations=budget, seed=1)
     assert sum(rows) == budget == front.stats["evaluations"]
-    assert len(front)
-    assert nondominated(front.F).all()
+    assert len(front) and nondominated(front.F).all()
 
 
 @pytest.mark.parametrize("settings", [*SMALL, *HANDLED], ids=named)
@@ -217,11 +215,8 @@ def test_failures_and_constraints_stop_no_solver(settings: Any) -> None:
 
     front = settings.minimize(function, CUBE, evaluations=250, seed=3)
     assert len(front) >= (1 if settings.handling == "objective" else 3)  # there the population is spread over the infeasible ones too
-    assert (front.violation <= 1e-6).all()
-    assert (front.decision[:, 0] <= 0.8).all()
-    assert front.stats["failures"]["failed"] > 0
-    assert nondominated(front.F).all()
-    assert set(front.status) == {"converged"}
+    assert (front.violation <= 1e-6).all() and (front.decision[:, 0] <= 0.8).all() and front.stats["failures"]["failed"] > 0
+    assert nondominated(front.F).all() and set(front.status) == {"converged"}
 
 
 @pytest.mark.parametrize("settings", [*SMALL, *HANDLED], ids=named)
@@ -235,9 +230,7 @@ def test_without_feasible_points_the_message_has_the_nearest(settings: Any, what
         return schaffer(X) if what == "infeasible" else np.full((len(X), 2), np.nan), G
 
     front = settings.minimize(function, CUBE, evaluations=120, seed=3)
-    assert len(front) == 0
-    assert front.message.startswith("no feasible point in 120 evaluations")
-    assert front.closest is not None
+    assert len(front) == 0 and front.message.startswith("no feasible point in 120 evaluations") and front.closest is not None
     if what == "infeasible":
         assert front.closest.violation == min(seen)
         if settings.handling == "feasible-first":
@@ -253,13 +246,6 @@ def test_feasible_points_come_before_infeasible_ones_at_any_size_of_numbers(sett
     assert len(front)
     assert (np.abs(front.decision - 1.4).sum(axis=1) <= 1.2 + 1e-7).all()
     assert front.F[:, 1].min() <= 0.6e9  # 0, at x = (1, 1, 1)
-
-
-def test_a_single_objective() -> None:
-    for settings in (NSGA2(population=20), MOPSOCD(particles=20)):
-        front = settings.minimize(lambda X: (X**2).sum(axis=1, keepdims=True), CUBE, evaluations=300, seed=1)
-        assert len(front) == 1
-        assert front.F[0, 0] < 0.5
 
 
 # Starts, moved points, trajectories
@@ -304,8 +290,7 @@ def test_the_population_goes_where_the_evaluator_moves_it_and_starts_from_there(
     state = run(settings, box, 100)
     assert np.allclose(np.linalg.norm(state.members.Z[:, :3], axis=1), 1)
     assert np.array_equal(state.members.F, schaffer(state.members.Z[:, :3]))
-    assert (np.vstack(box.sent[-1:])[:, 3] >= 1).all()
-    assert state.members.Z[:, 3].max() >= 3
+    assert (np.vstack(box.sent[-1:])[:, 3] >= 1).all() and state.members.Z[:, 3].max() >= 3
     assert np.abs(np.vstack(box.sent)[:, :3]).max() <= 2
 
 
@@ -374,19 +359,20 @@ def test_directions_that_do_not_fit(settings: Any, m: int, message: str) -> None
         settings.minimize(function, [(0, 1)] * 4, evaluations=500, names=[f"f{k}" for k in range(m)])
 
 
-def test_objectives_whose_number_only_an_evaluation_tells() -> None:
+def test_objectives_whose_number_only_an_evaluation_tells_and_single_ones() -> None:
     for settings in (NSGA3(), MOEAD(population=5), RVEA(), CTAEA()):
         with pytest.raises(ValueError, match="at least two objectives"):
             settings.minimize(lambda X: X.sum(axis=1), [(0, 1)] * 4, evaluations=50)
     (function, bounds, _), rows = dtlz(2, 3), []
     NSGA3(divisions=4).minimize(lambda X: rows.append(len(X)) or function(X), bounds, evaluations=30, seed=1)
     assert rows == [1, 14, 15]  # the first of the fifteen gives the number of objectives
-
-
-def test_pymoo_s_changes_of_warnings_do_not_stay() -> None:
     before = list(warnings.filters)
     NSGA3().minimize(schaffer, CUBE, evaluations=300, seed=1)
     assert warnings.filters == before
+    for settings in (NSGA2(population=20), MOPSOCD(particles=20)):
+        front = settings.minimize(lambda X: (X**2).sum(axis=1, keepdims=True), CUBE, evaluations=300, seed=1)
+        assert len(front) == 1
+        assert front.F[0, 0] < 0.5
 
 
 def test_the_whole_front_of_a_population_holds_the_nearest_to_the_directions_and_changes_nothing_else():
@@ -465,10 +451,9 @@ def test_progress_is_that_of_pymoo_by_generations_or_by_evaluations() -> None:
         ours = run(RVEA(divisions=4), boxed(problem), 15 * n)
         for end in (("n_gen", n), ("n_eval", 15 * (n + 1))):
             truth = minimize(problem, theirs(RVEA(divisions=4), 3), end, seed=1)
-            assert np.array_equal(ours.members.F, truth.pop.get("F"))
-            assert np.array_equal(ours.vectors, truth.algorithm.survival.V)
-            assert np.array_equal(ours.ideal, truth.algorithm.survival.ideal)
-            assert np.array_equal(ours.nadir, truth.algorithm.survival.nadir)
+            survival = truth.algorithm.survival
+            assert np.array_equal(ours.members.F, truth.pop.get("F")) and np.array_equal(ours.vectors, survival.V)
+            assert np.array_equal(ours.ideal, survival.ideal) and np.array_equal(ours.nadir, survival.nadir)
 
 
 def test_vectors_are_not_adapted_to_an_objective_that_is_always_the_same() -> None:
@@ -489,8 +474,7 @@ def test_the_two_archives_are_full_and_only_the_first_has_to_be_feasible() -> No
 
     state = run(CTAEA(divisions=11), boxed(function, CUBE), 12 * 30)
     assert len(state.members) == len(state.diversity) == 12
-    assert (state.members.violation == 0).all()
-    assert (state.diversity.violation > 0).any()
+    assert (state.members.violation == 0).all() and (state.diversity.violation > 0).any()
     assert np.array_equal(state.ideal, np.minimum(state.ideal, state.diversity.F.min(axis=0)))
 
 

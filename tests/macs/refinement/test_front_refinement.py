@@ -60,11 +60,8 @@ def largest_control(point) -> float:
     return float(np.abs(phase.at(np.linspace(phase.t0, phase.tf, 20001))["u"]).max())
 
 
-def test_controls_stay_within_bounds_everywhere(coarse, fine):
+def test_refined_points_stay_within_bounds_keep_their_places_and_go_through_files(coarse, fine, tmp_path):
     assert largest_control(coarse[0]) > np.pi / 2 + 0.1 and all(largest_control(point) <= np.pi / 2 for point in fine)
-
-
-def test_points_keep_their_places_and_the_work_is_counted(coarse, fine):
     span = np.ptp(coarse.F, axis=0)
     assert np.abs((fine.F - coarse.F) / span)[1:].max() < 1e-5
     assert fine.stats["gradient_solves"] >= 8 and fine.stats["mesh_tolerance"] == 1e-7
@@ -72,9 +69,6 @@ def test_points_keep_their_places_and_the_work_is_counted(coarse, fine):
     # Each solve takes at least one iteration.
     assert fine.stats["inner_iterations"] >= coarse.stats["inner_iterations"] + fine.stats["gradient_solves"]
     assert len({len(point.decision) for point in fine}) > 1 and fine[0].transcription["settings"]["basis"] == "bernstein"
-
-
-def test_meshes_go_through_files_and_are_verified(tmp_path, fine):
     fine.save(tmp_path / "fine.nc")
     again = Front.load(tmp_path / "fine.nc")
     assert again.transcriptions == fine.transcriptions
@@ -137,14 +131,6 @@ def test_ctrl_c_while_a_point_is_solved_adds_no_note_to_that_point(coarse, monke
     assert all("not solved on a finer mesh" in point.note and "timeout" not in point.note for point in front)
 
 
-def test_a_time_limit_ends_it_too(coarse):
-    front = coarse.refine_mesh(time_limit=1e-6)
-    assert front.stats["stopped"] == "time limit" and front.stats["gradient_solves"] == coarse.stats["gradient_solves"]
-    assert np.array_equal(front.F, coarse.F)
-    with pytest.raises(ValueError, match="time_limit must be a positive number, not 0"):
-        coarse.refine_mesh(time_limit=0)
-
-
 @pytest.mark.slow
 def test_points_that_did_not_converge_stay_as_they_are():
     bad = front_with_a_bad_point()
@@ -173,11 +159,16 @@ def test_arguments_that_make_no_sense_are_refused(coarse, arguments, words):
         coarse.refine_mesh(**arguments)
 
 
-def test_what_has_no_mesh_of_ours_is_refused():
+def test_what_has_no_mesh_of_ours_is_refused_and_a_time_limit_ends_it(coarse):
     with pytest.raises(ValueError, match="black box"):
         black_box().refine_mesh()
     with pytest.raises(ValueError, match="only meshes of DFET"):
         flights(transcriptions=None).refine_mesh()
+    front = coarse.refine_mesh(time_limit=1e-6)
+    assert front.stats["stopped"] == "time limit" and front.stats["gradient_solves"] == coarse.stats["gradient_solves"]
+    assert np.array_equal(front.F, coarse.F)
+    with pytest.raises(ValueError, match="time_limit must be a positive number, not 0"):
+        coarse.refine_mesh(time_limit=0)
 
 
 @pytest.mark.slow

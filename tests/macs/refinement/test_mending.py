@@ -52,28 +52,19 @@ def test_the_least_time_is_mended_to_the_closed_form(marked, mended):
     assert check.max_defect < 1e-3 and check.violation < 1e-3
 
 
-def test_points_that_are_verified_stay_as_they_are(marked, mended):
+def test_verified_points_stay_as_they_are_without_time_all_and_the_work_is_counted(marked, mended):
     for before, after in zip(list(marked)[1:], list(mended)[1:], strict=True):
         np.testing.assert_array_equal(before.decision, after.decision)
         assert before.transcription == after.transcription
     again = mended.mended()
     np.testing.assert_array_equal(again.decision, mended.decision)
     assert again.stats["gradient_solves"] == mended.stats["gradient_solves"]
-
-
-def test_a_verified_point_is_not_lost_to_one_that_is_not(marked, mended):
-    """The quickest flight of the first mesh is no real one; the verified one that was known stands in its place, whichever came last."""
-    kept = mending._Mending(mended, 1e-3, print)._as_before(marked)
-    assert kept.verified.all() and (kept[0].decision == mended[0].decision).all() and (kept[2].decision == marked[2].decision).all()
-
-
-def test_the_work_is_counted(marked, mended):
     assert mended.stats["gradient_solves"] > marked.stats["gradient_solves"] and mended.stats["work"] > marked.stats["work"] > 0
     assert mended.stats["wall_time"] > marked.stats["wall_time"] and mended.stats["verify"] == marked.stats["verify"]
     assert mended.solver == marked.solver and mended.message == marked.message
-
-
-def test_without_time_points_are_left_as_they_are(marked):
+    # The quickest flight of the first mesh is no real one; the verified one that was known stands in its place, whichever came last.
+    kept = mending._Mending(mended, 1e-3, print)._as_before(marked)
+    assert kept.verified.all() and (kept[0].decision == mended[0].decision).all() and (kept[2].decision == marked[2].decision).all()
     found = marked.mended(time_limit=1e-9)
     assert found.verified.tolist() == [False, True, True] and found.stats["stopped"] == "time limit"
     np.testing.assert_array_equal(found.F, marked.F)

@@ -43,9 +43,8 @@ def pulses(edges: list[float]) -> tuple[Problem, float]:
     return problem, -float(np.abs(np.diff(s.integ()(np.array([0.0, *edges, 1.0])))).sum())
 
 
-@pytest.mark.parametrize("edges", [[0.2, 0.24, 0.6, 0.65], [0.05, 0.09, 0.7, 0.75]])
-def test_controls_that_a_coarse_mesh_hides_are_found_by_the_minimum_principle(edges):
-    problem, best = pulses(edges)
+def test_controls_that_a_coarse_mesh_hides_are_found_by_the_minimum_principle():
+    problem, best = pulses([0.2, 0.24, 0.6, 0.65])
     found = optimize(problem, progress=False)
     assert found.verified and found.objectives["end"] == pytest.approx(best, abs=1e-6)
 
@@ -133,13 +132,10 @@ def test_a_common_mesh_is_about_as_fine_as_each_of_several(several):
             assert not mostly or end - begin <= 2.0 * (high - low) + 0.01 or len(common) - 1 == SEARCH.elements
 
 
-def test_degrees_are_higher_than_any():
+def test_a_common_mesh_has_a_higher_degree_than_any_and_is_thinned_evenly():
     one, two = PhaseMesh((0.0, 1.0), 3, 1), PhaseMesh((0.0, 0.5, 1.0), 5, 2)
     assert (_together([one, two]).order, _together([one, two]).control_order) == (6, 2)
     assert _together([one, PhaseMesh((0.0, 1.0), 2)]).control_order is None
-
-
-def test_a_mesh_with_more_elements_than_a_search_is_to_have_is_thinned_evenly():
     fine = PhaseMesh(tuple(np.linspace(0, 1, 101).tolist()), 3)
     lengths = np.diff(_together([fine]).edges)
     assert len(lengths) == SEARCH.elements and lengths.max() / lengths.min() < 5
@@ -246,15 +242,14 @@ def test_what_one_coarse_mesh_cannot_do_is_not_called_infeasible():
     assert ends.verified.all() and ends.objectives[:, 0] == pytest.approx([364.104, 146.618], abs=1e-3 * (364.104 - 146.618))
 
 
-@pytest.mark.parametrize("tool", [optimize, lambda *arguments, **more: payoff(*arguments, **more)[0]])
-def test_the_scale_that_an_objective_states_counts_for_its_mesh(tool):
+def test_the_scale_that_an_objective_states_counts_for_its_mesh():
     """1000 and the cost of two layers, which a closed form has, in units of 1e-4."""
     problem = Problem("offset")
     f = problem.phase("f", t0=0.0, tf=40.0)
     x, u = f.state("x", bounds=(-3, 3), initial=1.5, final=1.0), f.control("u", bounds=(-6, 6))
     f.dynamics(x=-(x**3) + u)
     problem.minimize("cost", 1e3 + f.integral(0.5 * (x**2 + u**2)), scale=1e-4)
-    point = tool(problem, starts=1)
+    point = payoff(problem, starts=1)[0]
     assert point.verified and point.objectives["cost"] == pytest.approx(1001.330806904943, abs=1e-6)
 
 
@@ -338,9 +333,8 @@ def test_work_ends_where_it_is_to_end():
     whole, free = found_for(problem, wanted)
     part, loop = found_for(problem, wanted, most_work=0.3 * free.solves.counts.work)
     assert whole.good and not part.good and ("change" in part.note or "finer mesh" in part.note)
-    assert (
-        loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves and loop.solves.counts.work < 0.8 * free.solves.counts.work
-    )
+    assert loop.solves.counts.gradient_solves < free.solves.counts.gradient_solves
+    assert loop.solves.counts.work < 0.8 * free.solves.counts.work
 
 
 def test_programs_that_a_search_has_are_not_made_again():

@@ -13,17 +13,7 @@ from compiled_cases import compiled
 from fronts import distance_to_curve
 
 from macs import MACS, Front
-from macs.decisions import (
-    FuzzyGoal,
-    GoalProgramming,
-    Larger,
-    Nimbus,
-    PhysicalProgramming,
-    Preference,
-    ReferencePoint,
-    Smaller,
-    WeightedSum,
-)
+from macs.decisions import FuzzyGoal, GoalProgramming, Larger, Nimbus, PhysicalProgramming, Preference, ReferencePoint, Smaller, WeightedSum
 from macs.pareto import directions
 from macs.pareto.spread import spread
 from macs.search.guide import OUTSIDE_DENSITY, REGION_PART, PreferenceGuide, Region
@@ -77,15 +67,9 @@ def test_factors_by_the_region():
     assert inside.mean() == pytest.approx(REGION_PART, rel=0.05) and (factors[inside] == 1.0).all()
     assert (np.diff(factors[:1001]) >= 0).all() and factors[0] == factors[-1] == OUTSIDE_DENSITY
     assert guide.anchors(F).tolist() == [1000], "the worst values are those of the ends, which are kept anyway"
-
-
-def test_worst_values_that_the_ends_do_not_have_are_kept():
     F = np.array([[0.0, 0.5, 0.6], [0.6, 0.0, 0.5], [0.5, 0.6, 0.0], [0.2, 0.2, 0.2], [0.1, 0.1, 1.0]])
     anchors = PreferenceGuide(ReferencePoint({"f1": 0.0, "f2": 0.0, "f3": 0.0}), (*GOALS, Objective("f3"))).anchors(F)
     assert anchors.tolist() == [3, 4], "f3 is 0.6 at the ends, f1 and f2 nowhere worse than there"
-
-
-def test_on_surfaces_points_are_wanted_away_from_the_border():
     goals, lattice = (*GOALS, Objective("f3")), directions.simplex_lattice(3, 100)
     middle = ReferencePoint(dict.fromkeys(("f1", "f2", "f3"), 0.0), augmentation=0.0)
     factors, away = PreferenceGuide(middle, goals).factors(lattice, lattice), Region.of(middle, goals, lattice).away(lattice)
@@ -188,18 +172,21 @@ def test_a_checkpoint_goes_on_to_the_same_bits_and_belongs_to_its_preference(tmp
     assert again.F.tobytes() == whole.F.tobytes() and again.decision.tobytes() == whole.decision.tobytes()
 
 
-def test_the_file_of_a_front_has_the_preference(tmp_path):
+def test_preferences_go_to_files_and_other_processes_and_come_from_plain_data(tmp_path):
     front = minimize(MIDDLE, 200)
     front.save(tmp_path / "front.nc")
     assert Front.load(tmp_path / "front.nc").solver == front.solver
     assert "ReferencePoint" in str(front.solver["settings"]["prefer"])
-
-
-def test_settings_with_a_preference_go_to_other_processes():
     solver = MACS(prefer=PhysicalProgramming({"f1": Smaller(0.1, 0.2, 0.3, 0.4, 0.5)}))
     minimize(solver.prefer, 100)  # functions are cached
     again = pickle.loads(pickle.dumps(solver))
     assert again == solver and "prefer" in repr(again)
+    data = {"method": "ReferencePoint", "settings": {"aspiration": {"f1": 0.2}, "augmentation": 1e-3}}
+    solver = MACS(prefer=data)
+    assert solver.prefer == ReferencePoint({"f1": 0.2}, augmentation=1e-3)
+    assert MACS(prefer=solver.about()["settings"]["prefer"]) == solver
+    with pytest.raises(ValueError, match=r"MACS: prefer: .*'Wishes'"):
+        MACS(prefer={"method": "Wishes"})
 
 
 def never(X):
@@ -267,15 +254,6 @@ def test_one_objective_and_equal_ones():
     assert len(begun.archive)
 
 
-def test_plain_data_are_read(tmp_path):
-    data = {"method": "ReferencePoint", "settings": {"aspiration": {"f1": 0.2}, "augmentation": 1e-3}}
-    solver = MACS(prefer=data)
-    assert solver.prefer == ReferencePoint({"f1": 0.2}, augmentation=1e-3)
-    assert MACS(prefer=solver.about()["settings"]["prefer"]) == solver
-    with pytest.raises(ValueError, match=r"MACS: prefer: .*'Wishes'"):
-        MACS(prefer={"method": "Wishes"})
-
-
 FLIGHT = ReferencePoint({"flight time": 150.0, "horizontal speed": 0.6})
 
 
@@ -288,6 +266,7 @@ def flights() -> dict[str, Front]:
     }
 
 
+@pytest.mark.slow
 def test_gradients_go_where_the_preference_is_good(flights):
     truth = goddard.reference()
     guided, even = flights["guided"], flights["even"]
