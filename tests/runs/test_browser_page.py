@@ -115,9 +115,6 @@ def test_costates_are_those_of_the_point_and_have_units():
     exact = {**point.costates["ascent"], "Hamiltonian": point.hamiltonian["ascent"]}
     for name, one in adjoint.items():
         assert values_of(one["v"])[[0, -1]] == pytest.approx(exact[name][[0, -1]], rel=1e-5, abs=1e-9)
-
-
-def test_a_phase_without_length_has_no_costates_and_does_not_stretch_those_of_others():
     trajectory, costates = with_optional_phase(2e-6)
     climb, coast = curves(trajectory, costates, 400)
     assert (climb["lasts"], coast["lasts"]) == (True, False)
@@ -137,12 +134,6 @@ def test_a_page_loads_nothing_and_stays_small():
     policy = next(attrs["content"] for _, attrs in reader.tags if attrs.get("http-equiv") == "Content-Security-Policy")
     assert "default-src 'none'" in policy and "connect-src 'none'" in policy
     assert front_page(flights(10)) == content  # the same bytes for the same front
-
-
-EVIL = "</script><script>alert(1)</script><!-- {{style}} %{x} $a$ & <b>"
-
-
-def test_an_evil_name_ends_no_script_and_no_title():
     front = black_box(3).replace(message=EVIL)
     front.goals = (Objective(EVIL, EVIL), *front.goals[1:])
     before, after = Reader(front_page(black_box(3))), Reader(front_page(front))
@@ -150,6 +141,9 @@ def test_an_evil_name_ends_no_script_and_no_title():
     assert after.data["comparisons"][0]["goals"][0]["name"] == EVIL
     named = Reader(pages.page({"title": EVIL, "comparisons": []}, {}))
     assert named.title == EVIL
+
+
+EVIL = "</script><script>alert(1)</script><!-- {{style}} %{x} $a$ & <b>"
 
 
 def test_thinned_curves_keep_their_pulses():

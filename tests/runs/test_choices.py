@@ -63,16 +63,24 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_every_choice_has_a_row_those_that_are_alike_too(folder, told):
+def test_every_choice_has_a_row_and_stands_beside_published_degrees_and_eq_53(folder, told):
     rows = rows_of(folder / "report" / "glide-dfet-2x2-choices.csv")
     assert [row["choice"] for row in rows] == ["goals, regulating 0", "goals, regulating 0.1", "goals, regulating 0.2", "even"]
     # The front is the line distance = 3 time, from 1 to 5 s: in the middle, both memberships are a half.
-    assert float(rows[3]["time [s]"]) == pytest.approx(3.0, abs=1e-4) and float(rows[3]["degree of distance"]) == pytest.approx(
-        0.5, abs=1e-4
-    )
+    assert [float(rows[3][name]) for name in ("time [s]", "degree of distance")] == pytest.approx([3.0, 0.5], abs=1e-4)
     # With lambda > 0, every point but the end of the first objective is worse.
     assert [float(row["distance [km]"]) for row in rows[1:3]] == pytest.approx([15.0, 15.0], rel=1e-4)
     assert all(row["verified"] == "yes" for row in rows)
+    rows = rows_of(folder / "report" / "published-1.csv")
+    assert rows[0]["by"] == "the paper" and float(rows[0]["time [degree]"]) == 2.5
+    even = next(row for row in rows if row["choice"] == "even")
+    assert float(even["time [degree]"]) == pytest.approx(3.0, abs=1e-4)
+    rows = rows_of(folder / "report" / "published-2.csv")
+    assert [row["choice"] for row in rows[:2]] == ["theirs", "goals, regulating 0"]
+    # At the middle of the line both memberships are a half; the end of the first objective has 1 and 0.
+    assert [float(row["(53) at 0.1"]) for row in rows if row["choice"] in ("theirs", "even")] == pytest.approx([0.5, 0.5], abs=1e-4)
+    end = next(row for row in rows if row["choice"] == "goals, regulating 0.2")
+    assert float(end["kappa"]) == pytest.approx(-1.0, abs=1e-4) and float(end["(53) at 0.1"]) == pytest.approx(0.4, abs=1e-4)
 
 
 @pytest.mark.slow
@@ -82,13 +90,6 @@ def test_what_compares_fronts_is_left_out_and_pictures_are_drawn(folder):
     assert not any("indicators" in name or "attainment" in name for name in names)
     for figure in ("degrees-choices", "flights-choices", "lambda-choices-1"):
         assert (folder / "report" / f"glide-dfet-2x2-{figure}.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_published_degrees_stand_beside_ours_by_the_same_preference(folder, told):
-    rows = rows_of(folder / "report" / "published-1.csv")
-    assert rows[0]["by"] == "the paper" and float(rows[0]["time [degree]"]) == 2.5
-    even = next(row for row in rows if row["choice"] == "even")
-    assert float(even["time [degree]"]) == pytest.approx(3.0, abs=1e-4)
 
 
 def test_eq_53_at_the_printed_memberships():
@@ -104,15 +105,6 @@ def test_eq_53_at_the_printed_memberships():
         values = [one.completed(row)[f"(53) at {weight:g}"] for row in one.rows]
         assert np.argmin(values) == 1
         assert f"at '0.2': {values[1]:.4g}" in " ".join(one.optima())
-
-
-def test_eq_53_of_ours_stands_beside_the_papers(folder, told):
-    rows = rows_of(folder / "report" / "published-2.csv")
-    assert [row["choice"] for row in rows[:2]] == ["theirs", "goals, regulating 0"]
-    # At the middle of the line both memberships are a half; the end of the first objective has 1 and 0.
-    assert [float(row["(53) at 0.1"]) for row in rows if row["choice"] in ("theirs", "even")] == pytest.approx([0.5, 0.5], abs=1e-4)
-    end = next(row for row in rows if row["choice"] == "goals, regulating 0.2")
-    assert float(end["kappa"]) == pytest.approx(-1.0, abs=1e-4) and float(end["(53) at 0.1"]) == pytest.approx(0.4, abs=1e-4)
 
 
 @pytest.mark.parametrize(

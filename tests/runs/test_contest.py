@@ -149,17 +149,6 @@ def test_the_best_median_is_asked_on_a_share(name, key, least):
     assert BENCHES[name].targets(rows) == [], "not with all evaluations"
 
 
-def test_where_all_found_nothing_none_is_the_best():
-    assert contest.as_good_as_the_best(rows_of("MW1", "volume", 1.0, MACS=[0.0], NSGA_II=[0.0]), ["MW1"], "volume", 1.0) == []
-    assert contest.as_good_as_the_best(rows_of("UF1", "igd", 1.0, MACS=[np.inf], NSGA_II=[np.inf]), ["UF1"], "igd", 1.0) == []
-
-
-def test_runs_without_a_point_are_the_worst():
-    rows = rows_of("MW1", "igd", 1.0, MACS=[np.inf, np.inf, 0.1], NSGA_II=[0.2, 0.2, np.inf])
-    assert contest.medians(rows, "MW1", "igd") == {"MACS": np.inf, "NSGA-II": 0.2}
-    assert contest.rank(rows, rows[0], "igd") == "-" and contest.rank(rows, rows[1], "igd") == "1"
-
-
 def indicators(rows: list[Row]) -> list[tuple]:
     """What is measured but times."""
     return [(row.case, row.who, row.values["igd"], row.values["volume"]) for row in rows]
@@ -225,14 +214,6 @@ def test_a_search_that_fails_is_no_result(tmp_path, monkeypatch):
         replace(ZDT, rivals=()).measure([], Effort(keep=str(tmp_path)))
 
 
-def test_ours_alone_has_its_medians_and_no_test_of_ranks():
-    rows = [Row("UF1", "MACS", {"igd": [0.1, 0.2, 0.3, 0.4, 0.5], "seconds": [1.0] * 5, "evaluations": [10.0] * 5, "points": [9.0] * 5})]
-    text = BENCHES["uf"].report(rows)
-    assert contest.UNJUDGED in text and "0.300 [0.200, 0.400]" in text
-    assert contest.p_values(rows, "igd") == {}
-    assert not {"rank", "rival", "Holm"} & {word for column in contest.columns_of(rows, {}) for word in column[:2]}
-
-
 def test_differences_from_the_best_rival_are_counted():
     rows = [
         *rows_of("MW1", "volume", 1.0, MACS=[6, 7, 8, 9, 10], NSGA_II=[1, 2, 3, 4, 5], RVEA=[1, 1, 1, 1, 1]),
@@ -247,8 +228,18 @@ def test_differences_from_the_best_rival_are_counted():
     assert contest.against_the_best(rows_of("MW1", "volume", 1.0, MACS=[1]), "volume", {}) == []
 
 
-def test_p_values_are_corrected_for_all_rivals():
+def test_p_values_are_corrected_for_all_rivals_and_where_nothing_is_found_none_is_the_best():
     rows = rows_of("UF1", "igd", 1.0, MACS=[1, 2, 3, 4, 5], NSGA_II=[6, 7, 8, 9, 10], RVEA=[1, 2, 3, 4, 5])
     p = contest.p_values(rows, "igd")
     assert p["UF1", "NSGA-II"] == pytest.approx(2 * 2 / 252) and p["UF1", "RVEA"] == 1.0
     assert contest.p_values(rows_of("UF1", "igd", 1.0, MACS=[1, 2], NSGA_II=[6, 7]), "igd") == {}
+    assert contest.as_good_as_the_best(rows_of("MW1", "volume", 1.0, MACS=[0.0], NSGA_II=[0.0]), ["MW1"], "volume", 1.0) == []
+    assert contest.as_good_as_the_best(rows_of("UF1", "igd", 1.0, MACS=[np.inf], NSGA_II=[np.inf]), ["UF1"], "igd", 1.0) == []
+    rows = rows_of("MW1", "igd", 1.0, MACS=[np.inf, np.inf, 0.1], NSGA_II=[0.2, 0.2, np.inf])
+    assert contest.medians(rows, "MW1", "igd") == {"MACS": np.inf, "NSGA-II": 0.2}
+    assert contest.rank(rows, rows[0], "igd") == "-" and contest.rank(rows, rows[1], "igd") == "1"
+    rows = [Row("UF1", "MACS", {"igd": [0.1, 0.2, 0.3, 0.4, 0.5], "seconds": [1.0] * 5, "evaluations": [10.0] * 5, "points": [9.0] * 5})]
+    text = BENCHES["uf"].report(rows)
+    assert contest.UNJUDGED in text and "0.300 [0.200, 0.400]" in text
+    assert contest.p_values(rows, "igd") == {}
+    assert not {"rank", "rival", "Holm"} & {word for column in contest.columns_of(rows, {}) for word in column[:2]}

@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 from macs import Front, sweep
-from macs.decisions import Dialogue, Larger, PhysicalProgramming, ReferencePoint, Smaller, to_dict
+from macs.decisions import Dialogue, Larger, PhysicalProgramming, ReferencePoint, Smaller, WeightedSum, to_dict
 from problems import load
 from problems.compiled import Objective
+from runs import Study
 from runs.cli import main
 from transcription import DFET
 
@@ -68,17 +69,15 @@ def test_by_options(fronts: Path, here: Path, capsys: pytest.CaptureFixture[str]
 def test_a_preference_from_a_file_and_alternatives(fronts: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wanted = PhysicalProgramming({"flight time": Smaller.even(120, 220), "horizontal speed": Larger.even(0.8, 0.1)})
     (here / "wanted.json").write_text(json.dumps(to_dict(wanted)))
-    assert (
-        main(["decide", str(fronts / "goddard.nc"), "--rank-only", "--prefer", "wanted.json", "--alternatives", "2", "--json", "c.json"])
-        == 0
-    )
+    call = ["decide", str(fronts / "goddard.nc"), "--rank-only", "--prefer"]
+    assert main([*call, "wanted.json", "--alternatives", "2", "--json", "c.json"]) == 0
     said = capsys.readouterr().out
     assert "were ranked" in said and "not at hand" not in said and len(re.findall(r"^ +[12]  ", said, re.MULTILINE)) == 2
     assert Dialogue.load("c.json").preference == wanted
     # No point meets these limits.
     hard = PhysicalProgramming({"flight time": Smaller.even(100, 112), "horizontal speed": Larger.even(0.95, 0.9)})
     (here / "hard.json").write_text(json.dumps(to_dict(hard)))
-    assert main(["decide", str(fronts / "goddard.nc"), "--rank-only", "--prefer", "hard.json"]) == 1
+    assert main([*call, "hard.json"]) == 1
     assert "No point meets all hard limits" in capsys.readouterr().out
 
 
@@ -220,3 +219,50 @@ def test_commands_in_a_terminal(fronts: Path, here: Path) -> None:
         os.close(parent)
     assert len(Dialogue.load("c.json").history) == 3
     assert Front.load("c.nc")[0].objectives == Dialogue.load("c.json").choose().objectives
+
+
+# Preferences that guide searches, in studies and on the command line
+
+
+WANTED = WeightedSum({"flight time": 1.0, "horizontal speed": 2.0})
+
+
+@pytest.mark.slow
+def test_a_preference_in_a_study(tmp_path):
+    plain = {"solver": "macs", "mesh": "fixed", "prefer": to_dict(WANTED)}
+    study = Study("wishes", problems=["goddard"], transcriptions=["dfet:2x3"], solvers={"here": plain}, evaluations=20, runs=1, seed=1)
+    study.run(tmp_path)
+    (file,) = tmp_path.rglob("*.nc")
+    assert Front.load(file).solver["settings"]["prefer"] == to_dict(WANTED)
+    with pytest.raises(ValueError, match=r"solvers: MACS: prefer: .*'Wishes'"):
+        Study("wishes", problems=["goddard"], solvers={"here": {"solver": "macs", "prefer": {"method": "Wishes"}}}, runs=1, seed=1)
+
+
+@pytest.mark.slow
+def test_a_preference_on_the_command_line(tmp_path, capsys):
+    wish, out = tmp_path / "wish.json", tmp_path / "front.nc"
+    wish.write_text(json.dumps(to_dict(WANTED)))
+    call = ["solve", "goddard", "--transcription", "dfet:2x3", "--evaluations", "60", "--seed", "1", "--mesh", "fixed", "--out", str(out)]
+    assert main([*call, "--prefer", str(wish)]) == 0
+    assert Front.load(out).solver["settings"]["prefer"] == to_dict(WANTED)
+
+
+@pytest.mark.parametrize(
+    ("text", "solver", "words"),
+    [
+        (None, "macs", "there is no file|No such file"),
+        ("{", "macs", "is not JSON"),
+        ("[1]", "macs", "must have a preference"),
+        ('{"method": "Wishes"}', "macs", "'Wishes'"),
+        (json.dumps(to_dict(WeightedSum({"f1": 1.0}))), "macs", "'f1'"),
+        (json.dumps(to_dict(WANTED)), "nsga2", "--prefer .* does not apply"),
+    ],
+)
+def test_wrong_preferences(tmp_path, capsys, text, solver, words):
+    wish, out = tmp_path / "wish.json", tmp_path / "front.nc"
+    if text is not None:
+        wish.write_text(text)
+    assert main(["solve", "goddard", "--solver", solver, "--evaluations", "20", "--prefer", str(wish), "--out", str(out)]) == 2
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1 and re.search(words, said.err), said.err
+    assert not out.exists()

@@ -59,7 +59,7 @@ def test_of_the_best_so_far_from_the_first_feasible_point_on():
     np.testing.assert_allclose(y, [0.2, 0.6, 1.0])
 
 
-def test_the_table_says_what_the_median_run_attained_and_when():
+def test_the_table_says_what_the_median_run_attained_and_when_and_failed_runs_attain_nothing():
     (found,) = goal_attainments([comparison(*RUNS)], {"goal": COST})
     (row,) = rows(found)
     assert (row["transcription"], row["solver"], row["runs"]) == ("coarse", "s", "3")
@@ -69,9 +69,6 @@ def test_the_table_says_what_the_median_run_attained_and_when():
     (found,) = goal_attainments([comparison(*RUNS)], {"goal": COST | {"shares": [0.0001, 0.75, 0.8]}})
     (row,) = rows(found)
     assert [row[f"evaluations to {share}"] for share in ("0.0001", "0.75", "0.8")] == ["20", "20", "30"]
-
-
-def test_failed_runs_attain_nothing():
     (found,) = goal_attainments([comparison(*RUNS, failed=3)], {"goal": COST})
     (row,) = rows(found)
     assert row["runs"] == "6" and row["median attained"] == "" and row["upper quartile"] != "" and row["lower quartile"] == ""
@@ -83,6 +80,11 @@ def test_failed_runs_attain_nothing():
         ("2", "", ""),
         ("3", "0.875", "2.0"),
     ]
+    other = Comparison("q", "coarse", {"s": RUNS[:1]}, {"s": [comparison(*RUNS).known]}, {}, {}, {"s": 0})
+    found = goal_attainments([comparison(*RUNS), other], {"goal": COST})
+    assert [one.problem for one in found] == ["p", "q"]
+    assert goal_attainments([comparison(*RUNS)], {}) == []
+    assert goal_attainments([comparison(run(1))], {"goal": COST}) == []
 
 
 def test_studies_that_verify_also_have_the_attainment_of_verified_points():
@@ -110,14 +112,6 @@ def test_a_line_for_each_transcription_from_where_the_median_run_has_something()
     assert set(lines) == {"coarse, 3 runs", "fine, 3 runs"}
     np.testing.assert_allclose(lines["coarse, 3 runs"], [[10, 0], [20, 0.75], [30, 0.875], [30, 0.875]])
     np.testing.assert_allclose(lines["fine, 3 runs"], [[10, np.nan], [20, 0.5], [30, 0.75], [30, 0.75]])
-
-
-def test_each_problem_for_itself_and_nothing_without_a_goal():
-    other = Comparison("q", "coarse", {"s": RUNS[:1]}, {"s": [comparison(*RUNS).known]}, {}, {}, {"s": 0})
-    found = goal_attainments([comparison(*RUNS), other], {"goal": COST})
-    assert [one.problem for one in found] == ["p", "q"]
-    assert goal_attainments([comparison(*RUNS)], {}) == []
-    assert goal_attainments([comparison(run(1))], {"goal": COST}) == []
 
 
 @pytest.mark.parametrize(

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pymoo.indicators.gd import GD
+from pymoo.indicators.hv import HV
+from pymoo.indicators.igd import IGD
+from pymoo.indicators.igd_plus import IGDPlus
+from pymoo.problems import get_problem
 
 import runs
 from macs import Front
 from problems.cases import goddard
 from problems.compiled import Objective
 from runs import additive_epsilon, gd, hypervolume, igd, igd_plus
-from runs.measures.indicators import hypervolume_at
+from runs.measures.indicators import Scale, hypervolume_at
 from runs.measures.references import foreign
 
 LINE = np.column_stack([np.linspace(0, 1, 101), np.linspace(1, 0, 101)])
@@ -19,12 +24,6 @@ CORNERS = np.array([[0.0, 1.0], [1.0, 0.0]])
 
 @pytest.mark.parametrize("name", ["zdt1", "zdt3", "dtlz2"])
 def test_as_pymoo_has_them_on_its_own_fronts(name):
-    from pymoo.indicators.gd import GD
-    from pymoo.indicators.hv import HV
-    from pymoo.indicators.igd import IGD
-    from pymoo.indicators.igd_plus import IGDPlus
-    from pymoo.problems import get_problem
-
     truth = get_problem(name).pareto_front()
     rng = np.random.default_rng(0)
     # Every fifth point, too sparse for a curve; and a front somewhat above, some of it at the border of the volume.
@@ -40,13 +39,8 @@ def test_as_pymoo_has_them_on_its_own_fronts(name):
 
 def test_what_did_not_converge_is_no_point():
     goals = (Objective("cost"), Objective("gain", sense="maximize"))
-    front = Front(
-        F=[[0.0, -1.0], [0.5, 0.5], [-9.0, -9.0], [np.nan, np.nan]],
-        decision=[[]] * 4,
-        violation=[0, 0, 1, np.inf],
-        status=["converged", "converged", "infeasible", "failed"],
-        goals=goals,
-    )
+    F, status = [[0.0, -1.0], [0.5, 0.5], [-9.0, -9.0], [np.nan, np.nan]], ["converged", "converged", "infeasible", "failed"]
+    front = Front(F=F, decision=[[]] * 4, violation=[0, 0, 1, np.inf], status=status, goals=goals)
     good = np.array([[0.0, 1.0], [0.5, -0.5]])
     truth = np.array([[0.0, 2.0], [1.0, 3.0], [0.2, 2.2]])
     for indicator in (gd, igd, igd_plus, additive_epsilon, hypervolume):
@@ -58,8 +52,6 @@ def test_what_did_not_converge_is_no_point():
 
 
 def test_the_scale_says_what_was_done():
-    from runs.measures.indicators import Scale
-
     goals = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
     front = foreign(np.array([[110.0, 0.5]]), goals)
     truth = np.array([[100.0, 0.0], [200.0, 1.0], [150.0, 0.8], [300.0, 0.9]])
@@ -76,7 +68,7 @@ def test_the_scale_says_what_was_done():
     assert hypervolume(front, truth) == pytest.approx(np.prod((np.array(scale.corner) - [110, 0.5]) / [100, -1]))
 
 
-def test_a_dense_reference_is_a_curve():
+def test_a_dense_reference_is_a_curve_in_pieces_by_their_lengths_unless_curve_is_false():
     between = np.array([[0.005, 0.995], [0.305, 0.695]])
     assert gd(between, LINE) == pytest.approx(0.0, abs=1e-14)
     assert gd(between + 0.01, LINE) == pytest.approx(0.01 * np.sqrt(2), rel=1e-9)
@@ -87,15 +79,26 @@ def test_a_dense_reference_is_a_curve():
     assert igd(np.array([[0.5, 0.5]]), LINE) == pytest.approx(np.sqrt(2) / 4, rel=1e-3)
     uneven = np.vstack([LINE[:50], np.column_stack([np.linspace(0.5, 1, 5000), np.linspace(0.5, 0, 5000)])])
     assert igd(np.array([[0.5, 0.5]]), uneven) == pytest.approx(np.sqrt(2) / 4, rel=1e-3)
-
-
-def test_a_front_in_pieces_has_no_line_between_them():
     pieces = np.vstack([LINE[:31], LINE[70:]])
     assert gd(np.array([[0.5, 0.5]]), pieces) == pytest.approx(0.2 * np.sqrt(2), rel=1e-9)
     assert gd(np.array([[0.105, 0.895]]), pieces) == pytest.approx(0.0, abs=1e-14)
     assert igd(pieces, pieces) < 0.01
     cloud = np.vstack([LINE, LINE + 3.0])  # dominated points do not count
     assert gd(LINE, cloud) == 0.0 and igd(LINE, cloud) == igd(LINE, LINE)
+    # From 0 to 0.3, and from 0.8 to 1 with many more points: the mean of t is 0.15 on the first, 0.9 on the second.
+    share = np.concatenate([np.linspace(0.0, 0.3, 31), np.linspace(0.8, 1.0, 1001)])
+    reference = np.column_stack([share, 1.0 - share])
+    assert igd(np.array([[0.0, 1.0]]), reference) == pytest.approx((0.15 * 0.3 + 0.9 * 0.2) / 0.5 * np.sqrt(2), rel=2e-3)
+    # Of a straight front with a spacing of 1/100, and of one whose second half has a hundred times as many points.
+    between, end = np.array([[0.005, 0.995]]), np.array([[0.0, 1.0]])
+    assert gd(between, LINE) == pytest.approx(0.0, abs=1e-14)
+    assert gd(between, LINE, curve=False) == pytest.approx(0.005 * np.sqrt(2))
+    share = np.concatenate([np.linspace(0.0, 0.49, 50), np.linspace(0.5, 1.0, 5000)])
+    uneven = np.column_stack([share, 1.0 - share])
+    # From its end a point at a share t is t sqrt(2) away, and worse by t in one objective.
+    for indicator, unit in ((igd, np.sqrt(2)), (igd_plus, 1.0)):
+        assert indicator(end, uneven) == pytest.approx(0.5 * unit, rel=1e-3)
+        assert indicator(end, uneven, curve=False) == pytest.approx(share.mean() * unit)
 
 
 def test_volumes_and_distances_in_closed_form():
@@ -110,14 +113,16 @@ def test_volumes_and_distances_in_closed_form():
     scaled = LINE * [1e-3, 1e5] + [7.0, -3.0]
     for indicator in (gd, igd, igd_plus, additive_epsilon, hypervolume):
         assert indicator(scaled + np.array([1e-4, 2e4]), scaled) == pytest.approx(indicator(LINE + np.array([0.1, 0.2]), LINE), rel=1e-6)
-
-
-def test_fronts_of_other_objectives_are_not_compared():
-    goals = [Objective("time", "s"), Objective("fuel", "kg")]
-    for others in (goals[::-1], [goals[0], Objective("fuel", "t")], [goals[0], Objective("fuel", "kg", "maximize")]):
-        with pytest.raises(ValueError, match="the reference has other objectives: minimize"):
-            gd(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), others))
-    assert gd(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), [goals[0], Objective("fuel", "kg", scale=2.0)])) >= 0.0
+    assert gd(np.array([[2.0, 3.0]]), np.array([[1.0, 1.0]])) == pytest.approx(np.sqrt(5.0))
+    assert hypervolume(np.array([[1.5, 1.5]]), np.array([[1.0, 1.0]])) == pytest.approx(0.6**2)
+    # From (1 s, 9 m/s) to (5 s, 2 m/s) it is 4 by 7, and from (3 s, 10 m/s) 2 by 1 more; a point that failed adds nothing.
+    goals = (Objective("time", "s"), Objective("speed", "m/s", "maximize"))
+    status = ["converged", "converged", "infeasible"]
+    front = Front(F=[[1.0, -9.0], [3.0, -10.0], [0.0, -20.0]], decision=[[]] * 3, violation=[0, 0, 1], status=status, goals=goals)
+    assert hypervolume_at(front, (5.0, 2.0)) == pytest.approx(4 * 7 + 2 * 1)
+    assert hypervolume_at(front, (5.0, 9.5)) == pytest.approx(2 * 0.5)
+    assert hypervolume_at(front, (0.5, 2.0)) == hypervolume_at(front[front.status == "infeasible"], (5.0, 2.0)) == 0.0
+    assert hypervolume_at(np.array([[1.0, -9.0], [3.0, -10.0]]), (5.0, -2.0)) == pytest.approx(30.0)
 
 
 def test_empty_fronts_and_nonsense():
@@ -132,42 +137,11 @@ def test_empty_fronts_and_nonsense():
         igd(np.zeros(2), LINE)
     with pytest.raises(AttributeError, match="hypervolum"):
         runs.hypervolum  # noqa: B018
-
-
-def test_a_volume_up_to_a_point_is_in_the_units_and_senses_of_the_user():
-    """From (1 s, 9 m/s) to (5 s, 2 m/s) it is 4 by 7, and from (3 s, 10 m/s) 2 by 1 more; a point that failed adds nothing."""
-    goals = (Objective("time", "s"), Objective("speed", "m/s", "maximize"))
-    status = ["converged", "converged", "infeasible"]
-    front = Front(F=[[1.0, -9.0], [3.0, -10.0], [0.0, -20.0]], decision=[[]] * 3, violation=[0, 0, 1], status=status, goals=goals)
-    assert hypervolume_at(front, (5.0, 2.0)) == pytest.approx(4 * 7 + 2 * 1)
-    assert hypervolume_at(front, (5.0, 9.5)) == pytest.approx(2 * 0.5)
-    assert hypervolume_at(front, (0.5, 2.0)) == hypervolume_at(front[front.status == "infeasible"], (5.0, 2.0)) == 0.0
-    assert hypervolume_at(np.array([[1.0, -9.0], [3.0, -10.0]]), (5.0, -2.0)) == pytest.approx(30.0)
-
-
-def test_with_curve_false_a_reference_is_its_points_alone_however_dense():
-    """Of a straight front with a spacing of 1/100, and of one whose second half has a hundred times as many points."""
-    between, end = np.array([[0.005, 0.995]]), np.array([[0.0, 1.0]])
-    assert gd(between, LINE) == pytest.approx(0.0, abs=1e-14)
-    assert gd(between, LINE, curve=False) == pytest.approx(0.005 * np.sqrt(2))
-    share = np.concatenate([np.linspace(0.0, 0.49, 50), np.linspace(0.5, 1.0, 5000)])
-    uneven = np.column_stack([share, 1.0 - share])
-    # From its end a point at a share t is t sqrt(2) away, and worse by t in one objective.
-    for indicator, unit in ((igd, np.sqrt(2)), (igd_plus, 1.0)):
-        assert indicator(end, uneven) == pytest.approx(0.5 * unit, rel=1e-3)
-        assert indicator(end, uneven, curve=False) == pytest.approx(share.mean() * unit)
-
-
-def test_pieces_of_a_reference_count_by_their_lengths():
-    """From 0 to 0.3, and from 0.8 to 1 with many more points: the mean of t is 0.15 on the first, 0.9 on the second."""
-    share = np.concatenate([np.linspace(0.0, 0.3, 31), np.linspace(0.8, 1.0, 1001)])
-    reference = np.column_stack([share, 1.0 - share])
-    assert igd(np.array([[0.0, 1.0]]), reference) == pytest.approx((0.15 * 0.3 + 0.9 * 0.2) / 0.5 * np.sqrt(2), rel=2e-3)
-
-
-def test_a_reference_of_one_point_has_the_unit_one():
-    assert gd(np.array([[2.0, 3.0]]), np.array([[1.0, 1.0]])) == pytest.approx(np.sqrt(5.0))
-    assert hypervolume(np.array([[1.5, 1.5]]), np.array([[1.0, 1.0]])) == pytest.approx(0.6**2)
+    goals = [Objective("time", "s"), Objective("fuel", "kg")]
+    for others in (goals[::-1], [goals[0], Objective("fuel", "t")], [goals[0], Objective("fuel", "kg", "maximize")]):
+        with pytest.raises(ValueError, match="the reference has other objectives: minimize"):
+            gd(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), others))
+    assert gd(foreign(np.ones((1, 2)), goals), foreign(np.ones((1, 2)), [goals[0], Objective("fuel", "kg", scale=2.0)])) >= 0.0
 
 
 @pytest.mark.filterwarnings("error")

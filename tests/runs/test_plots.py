@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 
+import moocore
 import numpy as np
 import pytest
 from synthetic_fronts import flights
 
+from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
-from runs.measures.attainment import attainment
+from runs.measures.attainment import attainment, band, staircase
 from runs.measures.references import foreign
 from runs.report.flights import flights_figure, representatives
 from runs.report.plots import attainment_figure, convergence_figure, front_figure
@@ -94,3 +96,63 @@ def test_flights_side_by_side_and_the_law(tmp_path):
     assert len(figure.axes[0].get_lines()) == 3 and len(figure.axes[1].get_lines()) == 2, "two phases, and the law where there is one"
     assert figure.axes[0].get_title(loc="left").startswith("point 1\ntime ")
     figure.savefig(tmp_path / "flights.png")
+
+
+# What many runs attain: surfaces by hand, against moocore and their definition; histories as median and quartiles
+
+
+ENDS = np.array([[1.0, 3.0], [3.0, 1.0]])
+MIDDLE = np.array([[2.0, 2.0]])
+GAINS = (Objective("cost"), Objective("gain", "m", "maximize"))
+
+
+def test_two_runs_by_hand_with_empty_fronts_senses_and_staircases():
+    for runs in ([ENDS, MIDDLE], [MIDDLE, ENDS]):
+        found = attainment(runs)
+        assert found.best.tolist() == [[1, 3], [2, 2], [3, 1]]
+        assert found.worst.tolist() == [[2, 3], [3, 2]]
+        assert found.median.tolist() == found.best.tolist()
+    found = attainment([ENDS, EMPTY, MIDDLE])
+    assert found.runs == 3 and found.corners[1].tolist() == [[2, 3], [3, 2]] and found.worst.shape == (0, 2)
+    assert found.median.tolist() == [[2, 3], [3, 2]]
+    nothing = attainment([foreign(EMPTY, GAINS)] * 2)
+    assert nothing.best.shape == (0, 2) and nothing.worst.shape == (0, 2)
+    runs = [foreign(front * [1, -1], GAINS) for front in (ENDS, MIDDLE)]
+    found, plain = attainment(runs), attainment([ENDS, MIDDLE])
+    for k in (1, 2):
+        assert (found.corners[k - 1] * [1, -1]).tolist() == plain.corners[k - 1].tolist()
+    mixed = attainment([runs[0], MIDDLE * [1, -1]])
+    assert mixed.worst.tolist() == found.worst.tolist()
+    plain = staircase(ENDS, np.ones(2), np.array([5.0, 6.0]))
+    assert plain.tolist() == [[1, 6], [1, 3], [3, 3], [3, 1], [5, 1]]
+    turned = staircase(ENDS * [1, -1], np.array([1, -1]), np.array([5.0, -6.0]))
+    assert (turned * [1, -1]).tolist() == plain.tolist()
+
+
+@pytest.mark.parametrize(("m", "runs"), [(2, 7), (3, 5)])
+def test_as_moocore_and_the_definition_have_them(m, runs):
+    rng = np.random.default_rng(m)
+    fronts = [rng.random((rng.integers(1, 7), m)) for _ in range(runs)]
+    found = attainment(fronts)
+    sets = np.repeat(np.arange(runs), [len(front) for front in fronts])
+    anywhere = rng.random((300, m))
+    attained = sum((front[:, None] <= anywhere).all(axis=2).any(axis=0).astype(int) for front in fronts)
+    for k in range(1, runs + 1):
+        theirs = moocore.eaf(np.vstack(fronts), sets, percentiles=[100 * k / runs])[:, :m]
+        assert sorted(found.corners[k - 1].tolist()) == sorted(theirs.tolist())
+        assert nondominated(found.corners[k - 1]).all()
+        assert ((found.corners[k - 1][:, None] <= anywhere).all(axis=2).any(axis=0) == (attained >= k)).all()
+
+
+def test_a_band_by_hand():
+    runs = [(np.array([1.0, 3.0]), np.array([10.0, 4.0])), (np.array([2.0]), np.array([6.0])), (np.array([1.0, 2.0]), np.array([8.0, 1.0]))]
+    found = band(runs)
+    assert found.x.tolist() == [1, 2, 3] and found.runs == 3
+    # Before its first sample the second run has failed; after its last each keeps its value.
+    assert found.median.tolist() == [10.0, 6.0, 4.0]
+    assert found.lower.tolist() == [9.0, 3.5, 2.5] and found.upper.tolist() == [np.inf, 8.0, 5.0]
+    mirrored = band([(x, -y) for x, y in runs], larger=True)
+    assert mirrored.median.tolist() == (-found.median).tolist() and mirrored.lower.tolist() == (-found.upper).tolist()
+    x = np.array([0.0, 1.0])
+    found = band([(x, np.array([np.nan, 2.0])), (x, np.array([np.inf, 3.0])), (x, np.array([1.0, 1.0]))])
+    assert found.median.tolist() == [np.inf, 2.0] and found.lower.tolist() == [np.inf, 1.5]

@@ -160,7 +160,7 @@ def test_names_of_other_places_are_refused_where_only_this_machine_is_meant(clie
         assert not everywhere.server.local and everywhere.ask("/status.json", Host="lab.example:80").status == 200
 
 
-def test_every_answer_has_headers_that_keep_other_places_out(client):
+def test_every_answer_has_headers_that_keep_other_places_out_and_is_compressed_if_asked(client):
     for path, method in (("/", "GET"), ("/data.json", "GET"), ("/nothing", "GET"), ("/", "POST")):
         headers = client.ask(path, method).headers
         policy = headers["Content-Security-Policy"]
@@ -168,9 +168,6 @@ def test_every_answer_has_headers_that_keep_other_places_out(client):
         assert "unsafe-inline" not in policy.split("script-src")[1].split(";")[0]
         assert headers["X-Content-Type-Options"] == "nosniff" and headers["Cross-Origin-Resource-Policy"] == "same-origin"
         assert "Access-Control-Allow-Origin" not in headers
-
-
-def test_browsers_that_say_so_get_answers_compressed(client):
     plain, compressed = client.ask("/data.json"), client.ask("/data.json", Accept_Encoding="gzip")
     assert int(compressed.headers["Content-Length"]) < len(plain.content) and compressed.content == plain.content
 

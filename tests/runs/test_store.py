@@ -139,10 +139,7 @@ def test_a_folder_that_is_written_is_refused_to_others(store):
         ({"start": "uniform"}, 'start is null there and "uniform" here'),
         ({"evaluations": 61}, "evaluations is 60 there and 61 here"),
         ({"solvers": {"small": NSGA2(population=4)}}, "large' is there but not here"),
-        (
-            {"solvers": {"small": NSGA2(population=6), "large": NSGA2(population=8)}},
-            "small: details.solver.settings.population is 4 there and 6 here",
-        ),
+        ({"solvers": {"small": NSGA2(population=6), "large": NSGA2(population=8)}}, "solver.settings.population is 4 there and 6 here"),
     ],
 )
 def test_another_study_is_refused_with_the_first_difference(store, changes, words):

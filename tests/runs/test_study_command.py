@@ -53,9 +53,8 @@ def test_run_resume_and_status(capsys):
     assert main(["study", "run", "gliders.toml", "--trust", "--runs", "1"]) == 0
     assert path.stat().st_mtime_ns == stamp
     study = Study.load("gliders.toml", trust=True)
-    assert (
-        study.name == "gliders" and study.runs == 2 and [run.status for run in study.status("out/gliders").runs] == ["finished", "missing"]
-    )
+    assert study.name == "gliders" and study.runs == 2
+    assert [run.status for run in study.status("out/gliders").runs] == ["finished", "missing"]
 
 
 def test_status_says_what_is_wrong(capsys):

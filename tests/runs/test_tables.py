@@ -22,7 +22,7 @@ EXAMPLE = table(
 )
 
 
-def test_text():
+def test_the_same_numbers_as_text_csv_latex_markdown_and_in_files(tmp_path):
     assert EXAMPLE.text().splitlines() == [
         "100 % of the runs",
         "",
@@ -35,30 +35,18 @@ def test_text():
         "",
         "Failed runs are worst.",
     ]
-
-
-def test_csv_has_all_digits_and_no_blanks():
     rows = list(csv.reader(io.StringIO(EXAMPLE.csv())))
     assert rows[0] == ["case", "solver", "GD [1]", "runs"]
     assert rows[1:] == [["orbit_rise", "MACS", "0.0001234", "30"], ["orbit_rise", "A & B", "inf", "3"], ["goddard", "MACS", "", "0"]]
-
-
-def test_latex():
     written = EXAMPLE.latex("tab:one")
     assert r"\caption{100 \% of the runs}" in written and r"\label{tab:one}" in written
     assert r"\begin{tabular}{llrr}" in written
     assert r"orbit\_rise & MACS & $1.2 \times 10^{-4}$ & $30$ \\" in written
     assert r" & A \& B & $\infty$ & $3$ \\" in written and r"goddard & MACS & -- & $0$ \\" in written
     assert [written.count(rule) for rule in (r"\toprule", r"\midrule", r"\bottomrule")] == [1, 1, 1]
-
-
-def test_markdown():
     text = table([Head("name"), Head("size", "m")], [["a|b", 1.5], ["c", None]], "A caption.", ["A note."]).markdown()
     rows = ["| name | size [m] |", "| :--- | ---: |", r"| a\|b | 1.50 |", "| c | - |"]
     assert text.splitlines() == ["**A caption.**", "", *rows, "", "A note."]
-
-
-def test_files(tmp_path):
     paths = EXAMPLE.save(tmp_path / "table.3")
     assert [path.name for path in paths] == ["table.3.txt", "table.3.csv", "table.3.tex"]
     assert paths[0].read_text() == EXAMPLE.text() + "\n" and paths[2].read_text() == EXAMPLE.latex("tab:table.3")

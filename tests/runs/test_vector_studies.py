@@ -98,13 +98,27 @@ def test_a_study_that_cannot_be_made_says_so_before_any_work(changes, message):
         Study("beams", **{**stated, **changes})
 
 
-def test_default_budgets_are_the_problems_own_and_functions_of_a_script_are_refused():
+def test_default_budgets_are_the_problems_own_and_what_studies_refuse(monkeypatch):
     assert Study("beams", problems="welded_beam", solvers="macs", runs=1, seed=1).cells[0].evaluations == 10_000
     with pytest.raises(ValueError, match=r"parabolas.*cannot be sent to another process"):
         Study("own", problems=parabolas(), solvers="macs", runs=1, seed=1)
     problem = parabolas(function=_of_a_script)
     with pytest.raises(ValueError, match="cannot import _of_a_script from a script"):
         Study("own", problems=problem, solvers="macs", runs=1, seed=1)
+
+    def study(**settings):
+        stated = {"problems": get_problem("zdt1"), "solvers": "macs", "evaluations": 100, "runs": 1, "seed": 1}
+        return Study("functions", **(stated | settings))
+
+    with pytest.raises(ValueError, match="problems: 'mine' must be a name, a Problem, one of pymoo"):
+        study(problems={"mine": {"problem": get_problem("zdt1"), "n_var": 3}})
+    with pytest.raises(ValueError, match="problem 'ZDT1' has none of its own"):
+        study(evaluations=None)
+    with pytest.raises(ValueError, match="problems: 'nk': bounds: pymoo problem"):
+        study(problems={"nk": Problem(n_var=2, n_obj=2)})
+    monkeypatch.setattr(Ours, "__module__", "__main__")
+    with pytest.raises(ValueError, match="cannot import Ours from a script"):
+        study(problems=Ours())
 
 
 def _of_a_script(X: np.ndarray) -> dict[str, np.ndarray]:
@@ -152,22 +166,6 @@ def test_a_study_of_problems_of_pymoo(tmp_path):
     assert "hypervolume" in study.report(tmp_path / "out", figures=False).text
     with pytest.raises(ValueError, match="contains another study"):
         replace(study, problems=[get_problem("zdt1", n_var=3), get_problem("g4")]).run(tmp_path / "out")
-
-
-def test_problems_of_pymoo_that_studies_refuse(monkeypatch):
-    def study(**settings):
-        stated = {"problems": get_problem("zdt1"), "solvers": "macs", "evaluations": 100, "runs": 1, "seed": 1}
-        return Study("functions", **(stated | settings))
-
-    with pytest.raises(ValueError, match="problems: 'mine' must be a name, a Problem, one of pymoo"):
-        study(problems={"mine": {"problem": get_problem("zdt1"), "n_var": 3}})
-    with pytest.raises(ValueError, match="problem 'ZDT1' has none of its own"):
-        study(evaluations=None)
-    with pytest.raises(ValueError, match="problems: 'nk': bounds: pymoo problem"):
-        study(problems={"nk": Problem(n_var=2, n_obj=2)})
-    monkeypatch.setattr(Ours, "__module__", "__main__")
-    with pytest.raises(ValueError, match="cannot import Ours from a script"):
-        study(problems=Ours())
 
 
 class Ours(Problem):
