@@ -1,7 +1,5 @@
 """A cart whose speed is its control: x' = u is integrated exactly by every method, so that what is off was put there by the test."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fronts with closed forms, on which preferences are tested."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from macs.front import Front

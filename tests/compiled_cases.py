@@ -1,7 +1,5 @@
 """Cases of the catalogue that are compiled once: their NLPs are kept with them, for all tests of a process that only read them."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from problems import load

@@ -6,8 +6,6 @@
 The file belongs to one machine: last bits depend on the processor. About five minutes with `--jobs 2`; names after the file choose some.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

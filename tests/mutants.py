@@ -4,8 +4,6 @@ mutmut makes the changes, runs the tests and keeps the results; here is only whi
 is worked on in a folder of its own, `build/mutants/NAME`, in which `mutmut browse` shows the results again.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -4,8 +4,6 @@ The wheel is installed into a fresh environment, with its dependencies as in con
 goddard` is run in an empty folder, then the first tests of a newcomer, which come from the source distribution.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

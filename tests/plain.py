@@ -1,7 +1,5 @@
 """Plain functions with known fronts: Zitzler, Deb and Thiele 2000; Deb, Thiele, Laumanns and Zitzler 2005; three of CEC 2009."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -3,8 +3,6 @@
 A module's tests are the files that import it in the folder of tests that mirrors its own; where none does, all that import it.
 """
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A cart from rest to rest: least effort against least time, of which the front is 12 / T^3."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from scipy.optimize import brentq

@@ -1,7 +1,5 @@
 """Problems with several objectives whose fronts are known in closed form."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Fronts built by hand: two phases with jumps in their controls, a black box, and their parts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache

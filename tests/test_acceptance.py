@@ -1,7 +1,5 @@
 """What the searches have to reach, against the true fronts: whole runs, over several seeds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from fronts import distance_to_curve, inverted_distance

@@ -1,7 +1,5 @@
 """Every public name says what it is, what it takes, and shows an example that runs."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 from doctest import ELLIPSIS, NORMALIZE_WHITESPACE, DocTestFinder, DocTestRunner

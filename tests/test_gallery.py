@@ -1,7 +1,5 @@
 """The gallery: each page is that of its script, every case has one, and what was learned can be seen on it."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import sys

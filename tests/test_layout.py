@@ -1,7 +1,5 @@
 """The weight of the house and the size of its rooms: a folder reads as a table of contents, a file has one idea (docs/architecture.md)."""
 
-from __future__ import annotations
-
 import ast
 from collections import Counter, defaultdict
 from collections.abc import Iterator
@@ -15,7 +13,7 @@ FLOORS = ("problems", "transcription", "macs", "runs")
 MODULES = [path for floor in FLOORS for path in sorted((ROOT / floor).rglob("*.py"))]
 ROOMS = [path for path in MODULES if path.name not in ("__init__.py", "__main__.py")]
 TESTS = list((ROOT / "tests").rglob("*.py"))
-LINES, CODE, OF_TESTS = 47_000, 27_700, 34_400
+LINES, CODE, OF_TESTS = 47_000, 27_700, 33_300
 """Most lines of the floors, lines of their code, and lines of the tests: what there is, to go down to 40,000, 25,000 and 28,000.
 What raises one of them says so in the changelog."""
 TWICE = {"MACS"}

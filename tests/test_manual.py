@@ -1,7 +1,5 @@
 """The manual is true: its code runs and prints what it says, its commands and study files are valid, and its links lead somewhere."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

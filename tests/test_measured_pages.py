@@ -1,7 +1,5 @@
 """Pages of measured results: each has a header, a command that exists, and files that it is of."""
 
-from __future__ import annotations
-
 import importlib.util
 import subprocess
 import sys

@@ -1,8 +1,6 @@
 """What is installed: all data files of the packages, and other packages that suit every Python we promise. `make package` builds the wheel
 and tries it."""
 
-from __future__ import annotations
-
 import tomllib
 from fnmatch import fnmatch
 from importlib.metadata import distributions

@@ -5,8 +5,6 @@ switches (`test_dfet_moving_edges`), rates (`test_trade_offs`), studies (`test_s
 failed flights (`test_inner`).
 """
 
-from __future__ import annotations
-
 import pickle
 import re
 import signal

@@ -1,7 +1,5 @@
 """Problems as a stranger states them who has read nothing but the public face."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

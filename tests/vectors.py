@@ -1,7 +1,5 @@
 """Products of single vectors in space, for rates that an integration asks for thousands of times: numpy's are made for long arrays."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 By hand: `python tests/fuzz/fuzzing.py --flights 2000 --boxes 1000`; a finding is printed with its seed, and repeated by it.
 """
 
-from __future__ import annotations
-
 import argparse
 import linecache
 import signal

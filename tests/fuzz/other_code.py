@@ -1,7 +1,5 @@
 """Flights by code of their own: plain terms, LSODA and plain sums, where MACS has CasADi Functions and DOP853."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random black boxes: functions of rows as careless users write them, with bounds of every kind."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

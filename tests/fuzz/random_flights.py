@@ -1,7 +1,5 @@
 """Random optimal control problems: stated for MACS, and as plain terms from which other code flies them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Random expressions that CasADi and plain Python evaluate alike, each by its own functions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

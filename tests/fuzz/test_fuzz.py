@@ -1,7 +1,5 @@
 """A minute of random problems and black boxes, and whether what judges them would see what is wrong."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """decide: the optimum of every preference on fronts that are known in closed form, and what it makes of other problems."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -243,9 +241,6 @@ def test_units_and_senses_do_not_matter() -> None:
     assert choice.value == pytest.approx((1 + 2e-4) * (HOPED - 0.7) / WIDE_T, rel=1e-6)
 
 
-# Other problems
-
-
 TIME, SPEED = "flight time", "horizontal speed"
 
 
@@ -322,9 +317,6 @@ def test_ranges_that_say_nothing_of_where_the_front_is() -> None:
         start=decide(cart(), MESH, WeightedSum({"time": 1.0}), ranges=RANGES, starts=1).point,
     )
     assert choice.objectives["effort"] == pytest.approx(12 / 64, rel=1e-6)
-
-
-# Never worse than what is known
 
 
 @cache

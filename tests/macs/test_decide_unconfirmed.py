@@ -1,7 +1,5 @@
 """decide: points that a simulation does not confirm are solved again for the same preference; which of several is chosen; what is said."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -155,9 +153,6 @@ def test_points_that_exceed_a_limit_between_nodes_are_moved_inside() -> None:
     assert one == pytest.approx(other, abs=1e-2) and KEPT_INSIDE in front[0].note and choice["message"] == ""
 
 
-# Which of several
-
-
 @cache
 def _at(T: float) -> Front:
     """A point of the front that a simulation confirms."""
@@ -209,9 +204,6 @@ def test_where_no_solve_reaches_the_limits_the_best_that_was_known_stands() -> N
     assert choice.objectives == best.objectives and np.isinf(choice.value)
     assert choice.message.startswith("achievement: the limit of 3 iterations was reached; the nearest violates dynamics of swing.")
     assert "of the best that was known, 'end at least -0.265786 m' is missed by" in choice.message
-
-
-# What is said
 
 
 def test_what_is_missed_has_the_unit_of_its_objective() -> None:

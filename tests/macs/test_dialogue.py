@@ -1,7 +1,5 @@
 """A dialogue: what is asked for, undone, saved and gone on with; on a front in closed form, with its problem and without."""
 
-from __future__ import annotations
-
 import json
 from functools import cache, reduce
 from operator import getitem

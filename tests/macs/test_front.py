@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -96,9 +94,6 @@ def test_empty_fronts_have_a_message_and_the_closest_point_also_merged():
     assert {"python", "numpy", "casadi"} <= set(stats["versions"])
 
 
-# Merging
-
-
 def test_merging_keeps_what_nothing_dominates():
     fronts = [flights(7, seed) for seed in range(3)]
     merged = Front.merge(fronts)
@@ -143,9 +138,6 @@ def test_fronts_of_different_things_do_not_merge():
         Front.merge([black_box(), black_box(decision=np.zeros((6, 2)), variables=black_box().variables[:2])])
     with pytest.raises(ValueError, match="no front"):
         Front.merge([])
-
-
-# Tables
 
 
 def test_a_table_has_a_row_for_each_point_and_warnings():

@@ -1,7 +1,5 @@
 """optimize, payoff and sweep: against closed forms and references, and what they say where there is nothing to find."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from functools import cache
@@ -33,9 +31,6 @@ def certificates(front: Front) -> np.ndarray:
 @cache
 def goddard(method: str = "pascoletti-serafini") -> Front:
     return sweep(compiled("goddard"), DFET(4, 6), points=10, method=method, starts=1)
-
-
-# Against the truth
 
 
 @pytest.mark.slow
@@ -116,9 +111,6 @@ def test_a_control_that_goes_round() -> None:
         assert np.all(np.abs(point.trajectory["walk"]["u"]) <= np.pi + 1e-9)
 
 
-# Ends
-
-
 def test_payoff_is_lexicographic_in_the_declared_order() -> None:
     ends = payoff(load("orbit_rise"), DFET(30, 1), starts=1)
     assert len(ends) == 2 and list(ends.status) == ["converged"] * 2
@@ -137,9 +129,6 @@ def test_optimize_takes_one_objective() -> None:
     assert point.objectives["horizontal speed"] == pytest.approx(0.903889755, abs=1e-6)
     assert point.status == "converged" and point.optimality < 1e-6 and point.simulate().max_defect < 1e-5
     assert optimize(two_wells(), MESH).objectives["from left"] == pytest.approx(0, abs=1e-9)
-
-
-# Starts, seeds, costs
 
 
 def two_valleys() -> Problem:
@@ -165,9 +154,6 @@ def test_the_same_seed_gives_the_same_bits_and_the_costs() -> None:
     assert one.stats["gradient_solves"] == two.stats["gradient_solves"] >= 2 * (2 * 2 + 2)
     assert one.stats["inner_iterations"] > one.stats["gradient_solves"] and one.stats["wall_time"] > 0 and one.stats["reproducible"]
     assert isinstance(sweep(shuttle(), MESH, points=3, starts=1, seed=None).stats["seed"], int)
-
-
-# What is not there
 
 
 def unreachable() -> Problem:

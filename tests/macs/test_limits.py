@@ -3,8 +3,6 @@
 The clocks of these tests are generous by half a second, and what they end would take many times as long.
 """
 
-from __future__ import annotations
-
 import io
 import logging
 import os
@@ -62,9 +60,6 @@ def ctrl_c(after: float):
         timer.cancel()
 
 
-# Iterations of IPOPT that evaluate nothing
-
-
 def endless() -> Watched:
     """A program that IPOPT would work on for minutes: a chain of narrow valleys, from the wrong end."""
     x = ca.SX.sym("x", 3000)
@@ -109,9 +104,6 @@ def test_a_search_that_is_cut_within_solves_goes_on_to_the_same_bits(tmp_path):
     assert part.F.tobytes() == whole.F.tobytes() and part.decision.tobytes() == whole.decision.tobytes()
 
 
-# Derivatives
-
-
 @pytest.mark.parametrize("method", [MultipleShooting(9), DFET(3, 3)])
 def test_they_are_not_built_to_the_end(method):
     nlp = method.transcribe(load("orbit_rise"))
@@ -128,9 +120,6 @@ def test_a_time_limit_ends_them_on_a_fine_mesh():
     with Interrupts(LIMIT), within(BOUND):
         solved = scalarize(nlp, start, reference=np.zeros(2), weights=np.ones(2))
     assert solved.status == "timeout" and solved.clocked
-
-
-# Newton loops
 
 
 def impossible() -> Problem:
@@ -151,9 +140,6 @@ def test_a_time_limit_ends_newton_loops():
         found = Newton(max_iterations=10**9).solve(nlp, np.zeros((4, len(nlp.free))))
     assert set(found.status) == {"timeout"} and found.clocked and found.iterations.min() > 10
     assert np.isfinite(found.violation).all()
-
-
-# Simulation
 
 
 def stiff() -> Problem:
@@ -199,9 +185,6 @@ def test_what_was_found_is_still_simulated_if_that_is_quick():
     assert signal.getsignal(signal.SIGINT) is before
 
 
-# Set-up
-
-
 def test_a_search_without_time_for_its_first_evaluation_says_so(tmp_path):
     front = MACS().solve(load("goddard"), DFET(4, 3), evaluations=100, seed=1, time_limit=1e-9)
     assert len(front) == 0 and front.message == "nothing was evaluated yet: time limit"
@@ -241,9 +224,6 @@ def test_mesh_refinement_ends_in_time():
     with within(BOUND):
         found = front.refine_mesh(tolerance=1e-10, limit=60, time_limit=LIMIT)
     assert len(found) == len(front) and found.stats["stopped"] == "time limit" and not found.stats["reproducible"]
-
-
-# Compiling
 
 
 @pytest.fixture
@@ -299,9 +279,6 @@ def test_a_compiler_that_fails_leaves_a_note(doubled, command, caplog):
     assert caplog.text.count("functions are not compiled, and take more time: ") == 1 and command in caplog.text
 
 
-# Work within work
-
-
 def test_what_interrupts_a_part_interrupts_the_whole():
     with Interrupts() as whole, Interrupts() as part:
         signal.raise_signal(signal.SIGINT)
@@ -325,9 +302,6 @@ def test_a_part_ends_with_the_whole():
     assert front.stats["stopped"] == "time limit" and len(front) and not front.stats["reproducible"]
 
 
-# Progress
-
-
 class Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
@@ -345,9 +319,6 @@ def test_progress_shows_itself_on_a_terminal_if_it_takes_long(monkeypatch):
             show("it goes on")
             time.sleep(0.2)
     assert not quick.getvalue() and not elsewhere.getvalue() and "it goes on" in slow.getvalue()
-
-
-# The command line
 
 
 def test_an_interrupted_report_ends_at_once():

@@ -1,7 +1,5 @@
 """Costates, the Hamiltonian and weights of points: along fronts, after refinement, in files and in pictures."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import casadi as ca
@@ -131,9 +129,6 @@ def test_switching_functions_change_sign_where_controls_do(name, switches):
     assert np.count_nonzero(np.diff(high)) == switches
 
 
-# Where there are none.
-
-
 def test_where_nothing_is_feasible_there_are_none():
     problem = Problem("too far")
     run = problem.phase("run", t0=0, tf=1)
@@ -144,9 +139,6 @@ def test_where_nothing_is_feasible_there_are_none():
     point = optimize(problem, parse("dfet:4x3"), starts=1)
     assert point.status != "converged" and point.costates is None
     assert point.plot().shape == (2,)
-
-
-# Files and pictures.
 
 
 def test_a_file_has_them(ascents, tmp_path):

@@ -1,7 +1,5 @@
 """Preferences of every class: as plain data and back, as functions of symbols, and what is wrong with one, in one line."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle

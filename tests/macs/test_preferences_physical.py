@@ -1,7 +1,5 @@
 """Physical programming: preference functions over all classes and boundaries; fuzzy ones against adaptive quadrature."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import casadi as ca
@@ -177,8 +175,6 @@ def test_the_value_is_the_logarithm_of_the_mean_and_the_last_boundary_a_hard_lim
     assert ranking.best.objectives["time"] == pytest.approx(2.0, abs=1e-3)
     assert np.isnan(ranking.degrees[:, 1]).all()
 
-
-# Fuzzy boundaries
 
 EVERY_CLASS = [
     Smaller(1, 2, 3, 4, 5),

@@ -1,7 +1,5 @@
 """Ranges of objectives: best and worst values by name, in the user's units and senses, and how objectives are normalised by them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from choices import plain_front

@@ -1,7 +1,5 @@
 """Rankings: their tables and figures, what is said of their best point, and fronts that are not as they should be."""
 
-from __future__ import annotations
-
 import io
 import warnings
 from types import SimpleNamespace
@@ -49,9 +47,6 @@ def flown(points: Any, F: Any, verified: list[bool]) -> Any:
     return marked(points, verified).replace(simulated_F=np.array(F, dtype=float) * points.signs)
 
 
-# Tables
-
-
 def test_tables() -> None:
     assert GOAL.rank(front(), RANGES).table() == "\n".join([
         "FuzzyGoal(targets={'a': 1.0, 'b': 15.0}, tolerances={'a': 4.0, 'b': 5.0})",
@@ -71,9 +66,6 @@ def test_tables() -> None:
     assert lines[3].endswith("largest 1 - membership  sum of all       a")
     assert lines[-1] == "... 2 more points" and len(lines) == 8
     assert "more" not in ranking.table() and "more" not in ranking.table(None)
-
-
-# Figures
 
 
 @pytest.mark.slow
@@ -137,9 +129,6 @@ def test_standings() -> None:
     assert standing(limits, agreed).tolist() == [0]
     beyond = standing(limits, front((5.0 + 4e-6 * 0.9, 14.0), (5.0 + 4e-6 * 1.1, 14.0)))
     assert beyond.tolist() == [0, 2], "up to rounding"
-
-
-# The order
 
 
 def test_equal_values_are_told_apart_by_the_sum_of_normalised_objectives() -> None:
@@ -270,9 +259,6 @@ def test_functions_are_drawn_over_ranges_and_a_little_beyond_with_points_on_them
     assert np.interp([7.5, 15.0, 20.0], x, y) == pytest.approx([0.5, 1.0, 1.0], abs=1e-3)
 
 
-# Bars
-
-
 def bars(ax: Any) -> list[list[float]]:
     return [[bar.get_height() for bar in container] for container in ax.containers]
 
@@ -303,9 +289,6 @@ def test_degrees_are_of_points_of_one_problem() -> None:
     for wrong in ([FRONT[0]], {}, {"here": 3}, {"here": FRONT[0], "there": 3}):
         with pytest.raises(ValueError, match=r"^choices must be a dict of points by name, not "):
             EVEN.plot_degrees(wrong, RANGES)  # type: ignore[arg-type]
-
-
-# Words
 
 
 def test_what_it_speaks_of_is_said_and_checked() -> None:

@@ -1,7 +1,5 @@
 """Stages: operands, values, hard limits and what is said of them, the order of points; and a preference of the user's own."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -28,9 +26,6 @@ LIMITED = Stage(
 
 def rows(*J: tuple[float, ...]) -> np.ndarray:
     return np.array(J, dtype=float)
-
-
-# Values and limits
 
 
 def test_peaks_are_the_largest_of_their_groups() -> None:
@@ -76,9 +71,6 @@ def test_what_is_missed_is_said_in_the_unit_of_its_objective() -> None:
         exceeded(LIMITED, GOALS[:2], np.array([1.0, 5.0, 1.0]))
 
 
-# The order
-
-
 def ordered(stages: Any, J: np.ndarray, **more: Any) -> list[int]:
     return ordering(stages, J, more.pop("kind", np.zeros(len(J))), **more)[0].tolist()
 
@@ -118,9 +110,6 @@ def test_later_stages_and_ties_tell_apart_what_is_as_good_as_the_best() -> None:
     # The last stage tells all differences: there is no slack in it.
     assert ordered([FREE], rows((1.0,), (1.0 - 1e-12,)), tie=np.array([0.0, 1.0]), same=1.0) == [1, 0]
     assert ordered([FREE], rows((1.0,))) == [0] and ordered([FREE], np.zeros((0, 1))) == []
-
-
-# A preference that a user writes
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """What each preference makes of a few objectives, in numbers that are worked out by hand: values, limits, degrees, and their words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """MACS as an algorithm of pymoo: its points are those of `macs.MACS`, and all that pymoo's users do with an algorithm works."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from typing import Any
@@ -87,9 +85,6 @@ def finished(algorithm: MACS) -> np.ndarray:
     return ordered(res.X, res.F)
 
 
-# The same search
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "settings"),
@@ -154,9 +149,6 @@ def test_points_are_judged_by_what_they_are_told_with():
         algorithm.tell(infills=asked)
     H = algorithm.opt.get("H")
     assert len(H) == 1 or np.abs(H).max() <= 1e-4
-
-
-# The course of a run
 
 
 def test_the_budget_is_never_exceeded():
@@ -238,9 +230,6 @@ def test_verbose_prints_pymoos_columns(capsys):
     assert capsys.readouterr().out == ""
 
 
-# Copies
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("copied", "name"), [(copy.deepcopy, "zdt1"), (lambda algorithm: pickle.loads(pickle.dumps(algorithm)), "bnh")], ids=["copy", "pickle"]
@@ -309,9 +298,6 @@ def test_an_interrupt_loses_no_evaluation():
         assert np.array_equal(finished(algorithm), expected) and algorithm.evaluator.n_eval == 600
 
 
-# Ask and tell
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bnh", "sphere"])
 def test_ask_and_tell_give_the_same_points(name):
@@ -342,9 +328,6 @@ def test_what_is_told_has_to_be_what_was_asked_for():
     assert algorithm.n_gen == 2
     with pytest.raises(ValueError, match="setup"):
         MACS().next()
-
-
-# First points
 
 
 def test_first_points_are_a_start():
@@ -389,9 +372,6 @@ def test_wrong_first_points_are_refused(X, message):
         minimize(get_problem("zdt1", n_var=2), MACS(sampling=X), ("n_eval", 50))
 
 
-# Failures
-
-
 def test_failed_evaluations_stop_nothing():
     res = minimize(Holes(), MACS(archive=10), ("n_eval", 800), seed=2, verbose=False)
     assert np.isfinite(res.F).all() and len(res.F) == 10 and ((np.abs(res.X - 1) >= 0.5) & (np.abs(res.X - 1) <= 1 + 1e-3)).all()
@@ -427,9 +407,6 @@ def test_what_is_feasible_is_in_the_individuals_config(monkeypatch):
     monkeypatch.setattr(Individual, "default_config", staticmethod(config))
     res = minimize(Equality(), MACS(), ("n_eval", 1_500), seed=1)
     assert 1e-3 < np.abs(res.H).max() <= 0.05 and (res.CV == 0).all()
-
-
-# What is refused
 
 
 def test_only_real_variables_with_bounds_settings_of_the_algorithm_and_constraints_that_stay():

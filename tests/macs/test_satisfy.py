@@ -1,7 +1,5 @@
 """satisfy: kappa is not positive at the end, every step is in the history, and the order is imposed where lambda does not do."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rest_to_rest import DIAGONAL, MESH, RANGES, WIDE_E, WIDE_T, balanced, both, cart, ends

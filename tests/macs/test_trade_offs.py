@@ -1,7 +1,5 @@
 """Trade-offs at points: against fronts and matrices in closed form, differences of other optima, and points moved off the front by hand."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -290,9 +288,6 @@ def test_controls_that_switch_at_moving_edges():
     assert len(edges) == 2 and np.linalg.norm(roots[:, edges], axis=0) == pytest.approx(nlp.span[edges])
 
 
-# Against other optima.
-
-
 @pytest.fixture(scope="module")
 def ascents() -> Front:
     return sweep(load("goddard"), parse("dfet:6x6"), points=12, method="epsilon", starts=1)
@@ -349,9 +344,6 @@ def test_rates_of_the_skip_entry_agree_with_differences_of_epsilon_constraint_op
         assert found.rate("terminal mass", "terminal speed") == pytest.approx(mass / speed, rel=0.02)
         assert found.matrix[1, 0] == pytest.approx(mass / speed, rel=0.02)
         assert not found.messages
-
-
-# What is found out.
 
 
 def moved(front: Front, by: float, seed: int) -> Front:
@@ -444,9 +436,6 @@ def test_a_choice_knows_what_it_costs():
     assert choice.trade_offs.point is choice.point
     assert choice.trade_offs.rate("horizontal speed", "flight time") == pytest.approx((0.4 / 141.0) / (0.6 / 0.9), rel=1e-5)
     assert choice.trade_offs.matrix[0, 1] == pytest.approx((0.4 / 141.0) / (0.6 / 0.9), rel=1e-5)
-
-
-# Tables and pictures.
 
 
 def test_tables_and_pictures_of_points(ascents):

@@ -1,7 +1,5 @@
 """What the tests of statements share."""
 
-from __future__ import annotations
-
 import pytest
 
 from problems import Phase, Problem

@@ -1,7 +1,5 @@
 """Which absolute values are found among the terms of an integrand."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Ascent, orbit rise and landing sites: statements against the papers, true fronts against other code; bad data of all cases."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

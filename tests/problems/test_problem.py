@@ -1,7 +1,5 @@
 """Statements: what is refused, by the user's own names, and what is read back."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -132,9 +130,6 @@ def test_what_was_refused_leaves_nothing_behind():
     assert problem.compile().fingerprint == before
 
 
-# Afterwards
-
-
 def test_what_was_stated_can_be_read_back():
     problem, phase = glider()
     mass = problem.parameter("mass", bounds=(0, 1))
@@ -213,9 +208,6 @@ def test_bounds_that_rounding_cannot_tell_apart_are_one_value():
     ranges = [own.tf, next(v for v in own.controls if v.name == "trim"), compiled.parameters[-1], own.paths[-1], compiled.limits[-1]]
     assert [(one.lower, one.scale) for one in ranges] == [(3.0, 1.0), (0.1, 1.0), (7.0, 1.0), (0.5, 1.0), (3.0, 1.0)]
     assert all(one.lower == one.upper for one in ranges)
-
-
-# Links
 
 
 def relay(count: int = 3) -> tuple[Problem, list[Phase]]:
@@ -319,9 +311,6 @@ def test_times_are_narrowed_along_links_both_ways():
         assert times[1] <= 4
     compiled = problem.compile()
     assert compiled.phases[2].final[0] == (3, 3) and compiled.phases[3].initial[0] == (3, 3)
-
-
-# Expressions
 
 
 def test_every_state_needs_a_rate_and_nothing_else_has_one():

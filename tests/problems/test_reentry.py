@@ -1,7 +1,5 @@
 """The re-entries against an implementation of their own in numpy, from the published figures in SI; their fronts simulated by it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """Both skip entries against Newton's law in vectors and the papers' figures, their ends flown again by code of its own."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The collection of published problems: complete, and solved to what is published. Independent references: test_standard_truths.py."""
 
-from __future__ import annotations
-
 import inspect
 import math
 

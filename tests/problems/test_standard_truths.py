@@ -1,7 +1,5 @@
 """Independent references of published problems: closed forms, the maximum principle by shooting, arcs of known controls by integration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_bvp, solve_ivp
@@ -24,9 +22,6 @@ def shot(residual, guess):
     found, _, flag, words = fsolve(residual, guess, xtol=1e-12, full_output=True)
     assert np.abs(residual(found)).max() < 1e-8, (flag, words)
     return found
-
-
-# Closed forms
 
 
 @pytest.mark.parametrize("wall", [1 / 9, 0.2])
@@ -164,9 +159,6 @@ def test_the_shortest_word():
     assert min(dubins_words(0.0, 2.0, np.pi).values()) == pytest.approx(np.pi)
 
 
-# The maximum principle
-
-
 def test_the_fast_oscillator_with_one_switch():
     def moved(u, start, duration):
         return solve_ivp(lambda t, x: [x[1], -x[0] + x[1] * (1 - x[0] ** 2) + u], (0, duration), start, **TIGHT).y[:, -1]
@@ -271,9 +263,6 @@ def test_the_best_temperatures():
 
     w = shot(lambda w: end(w)[2:] - [0, 1], [0.78, 0.79])
     assert value("batch_reactor") == pytest.approx(end(w)[1], abs=2e-9)
-
-
-# Arcs of constant controls
 
 
 def flown(name, arcs, durations):

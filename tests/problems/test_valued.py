@@ -1,7 +1,5 @@
 """Problems with a function of another problem's objectives in their place."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pymoo.problems import get_problem
@@ -124,9 +122,6 @@ def test_problems_load_by_name_and_from_files_with_data(tmp_path):
     assert isinstance(beam, VectorProblem) and beam.address == "welded_beam" and beam.default_evaluations == 10_000
     with pytest.raises(ValueError, match="did you mean 'welded_beam'"):
         load("welded_bean")
-
-
-# The cases
 
 
 def test_the_welded_beam_is_that_of_another_program():

@@ -1,7 +1,5 @@
 """A winged vehicle over a planet that turns, against what an observer who does not turn sees."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

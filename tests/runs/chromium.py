@@ -1,7 +1,5 @@
 """Headless Chromium for tests: whether there is one, and questions to a page in it."""
 
-from __future__ import annotations
-
 import shutil
 import time
 from pathlib import Path

@@ -3,8 +3,6 @@
 By hand: `python tests/runs/kills.py --kills 100`.
 """
 
-from __future__ import annotations
-
 import argparse
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """A tiny problem, and solvers that do to a run what may happen to one. Processes of their own import this module."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

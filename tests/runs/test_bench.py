@@ -1,7 +1,5 @@
 """Benchmarks: what they measure, print, save and ask; never how fast anything is."""
 
-from __future__ import annotations
-
 import csv
 import os
 import signal
@@ -45,9 +43,6 @@ def interpreted(monkeypatch):
     monkeypatch.setenv("MACS_COMPILE", "0")
 
 
-# The contract
-
-
 def a_bench(**changes) -> Bench:
     """A benchmark of numbers, whose case is the value of its first round."""
 
@@ -85,9 +80,6 @@ def test_cases_are_measured_round_by_round_each_contender_first_in_turn():
     assert verdicts([]) == []
     lines = verdicts([Target("one", "at most 1", "0.5", True), Target("another one", "none", "two", False)])
     assert lines[2:] == ["one          at most 1  0.5       met", "another one  none       two       MISSED"]
-
-
-# The command
 
 
 @pytest.fixture
@@ -173,9 +165,6 @@ def test_options_reach_the_searches_and_the_header(monkeypatch, tmp_path):
     assert "--seeds 3 --jobs 2 --solvers MACS MOEA/D --page" in header.command
 
 
-# What is asked
-
-
 def front_rows(ratio: float, good: float) -> list[Row]:
     others = [Row("goddard", who, {"ratio": times(ratio), "good": [good] * 3}) for who in (searches.PROPAGATE, searches.PROJECTION)]
     sweeps = [Row("goddard", who, {"ratio": [0.5], "good": [1.0]}) for who in (searches.SWEEP, searches.SWEEPS)]
@@ -247,9 +236,6 @@ def test_targets_follow_the_medians():
     for kind, rows, missed in MET_AND_MISSED:
         assert sum(not one.met for one in BENCHES[kind].targets(rows)) == missed, (kind, rows)
     assert set(BENCHES) - {kind for kind, *_ in MET_AND_MISSED} == {"many", "parts", "uf", "zdt", "constrained"}
-
-
-# Each benchmark
 
 
 @pytest.mark.slow
@@ -358,8 +344,6 @@ def test_peers_that_are_missing_are_named(monkeypatch):
     assert "not installed: yapss, rockit; for a comparison: pip install" in BENCHES["peers"].report(rows)
     assert all(len(example.problem().objectives) == 1 for example in peers.EXAMPLES)
 
-
-# Growth
 
 TINY = {"elements": 4, "nodes": 4, "intervals": 4, "phases": 2, "masses": 2, "points": 2, "agents": 4}
 

@@ -3,8 +3,6 @@
 Skipped where there is no Chromium with its driver (Debian: chromium, chromium-driver).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pages for the browser, without one: their data are the front's, their texts stay texts, and wrong calls are one line."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json

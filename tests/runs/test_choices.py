@@ -1,7 +1,5 @@
 """Studies of choices: their tables and pictures, and published degrees beside ours."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

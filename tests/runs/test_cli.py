@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import re
 import signal
 import subprocess
@@ -82,9 +80,6 @@ def saved(tmp_path_factory):
     return folder, subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=120)
 
 
-# Help and lists
-
-
 def test_help_is_instant():
     code = (
         "import sys\nfrom runs.cli import main\n"
@@ -103,9 +98,6 @@ def test_list_has_a_line_for_every_case_and_every_study(capsys):
     assert main(["list"]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert [words[0] for words in lines] == [*names(), *studyfile.names()] and all(len(words) > 3 for words in lines)
-
-
-# Solving
 
 
 def test_solve_prints_defects_and_leaves_a_front_and_a_picture(saved):
@@ -353,9 +345,6 @@ def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, refused, monkeypatc
     rest = Front.load("rest.nc")
     assert rest.F.tobytes() == whole.F.tobytes() and rest.decision.tobytes() == whole.decision.tobytes()
     assert rest.stats["evaluations"] == whole.stats["evaluations"]
-
-
-# Looking at what was saved
 
 
 def test_show_prints_draws_and_exports(capsys):

@@ -1,7 +1,5 @@
 """Studies whose points are simulated: what counts in their reports, and the published tables that need it."""
 
-from __future__ import annotations
-
 import csv
 import shutil
 from pathlib import Path

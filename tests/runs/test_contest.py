@@ -1,7 +1,5 @@
 """Searches on plain functions: the functions against closed forms, what is measured, and what is asked."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from operator import methodcaller
 

@@ -1,7 +1,5 @@
 """`macs decide`: by options, by commands in a terminal, and what it refuses."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty

@@ -1,7 +1,5 @@
 """StatedGoal attainment: the formula, its history over runs, and what reports show of it."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Indicators against closed forms and against pymoo."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pymoo.indicators.gd import GD

@@ -1,7 +1,5 @@
 """Kills at random times: whatever is resumed has the same numbers."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pages of measured results, their headers, and what only verified points and counted work may decide in reports."""
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 from datetime import date

@@ -1,7 +1,5 @@
 """Figures of studies show what they were given. How they look was looked at."""
 
-from __future__ import annotations
-
 import sys
 
 import moocore

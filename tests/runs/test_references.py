@@ -1,7 +1,5 @@
 """Where references come from: files, closed forms, unions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

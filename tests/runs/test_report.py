@@ -1,7 +1,5 @@
 """Reports on study folders: what they say, what they leave out, and that one command makes all of it."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Schemas of plain data: errors of one line that name the key, the value and the nearest known word."""
 
-from __future__ import annotations
-
 import msgspec
 import numpy as np
 import pytest

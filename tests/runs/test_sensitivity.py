@@ -1,7 +1,5 @@
 """Fronts under changed data and dispersions: what reports say and draw where everything is known, and what is refused."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

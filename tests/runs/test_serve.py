@@ -1,7 +1,5 @@
 """The server of `macs serve`, asked by http.client: what it answers, whom it answers, and files that change or are wrong under its eyes."""
 
-from __future__ import annotations
-
 import gzip
 import http.client
 import json

@@ -1,7 +1,5 @@
 """Live pages in headless Chromium: they follow a study, keep what their reader has chosen, and outlive their server."""
 
-from __future__ import annotations
-
 import threading
 import time
 

@@ -1,7 +1,5 @@
 """Statistics against scipy, hand-computed cases, and what must hold of any sample."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.stats

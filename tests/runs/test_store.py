@@ -1,7 +1,5 @@
 """The folder of a study, with outcomes written by hand: what counts as finished, what is refused, and what the table says."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 
@@ -83,9 +81,6 @@ def test_a_finished_run_leaves_neither_checkpoint_nor_samples_and_a_failed_one_b
     assert not checkpoint.exists() and not samples_path(checkpoint).exists()
 
 
-# What is damaged
-
-
 def test_a_front_that_is_not_what_was_written_is_unreadable_and_kept_beside_a_new_one(store):
     finish(store)
     run = next(store.runs())
@@ -114,9 +109,6 @@ def test_a_front_without_a_record_counts_if_it_can_be_read_and_a_record_without_
     record.write_bytes(content.replace(b"2.0", b"3.0"))
     found = next(store.runs())
     assert found.status == "unreadable" and found.message.startswith(f"its record '{record}' is damaged")
-
-
-# Which study a folder has
 
 
 def test_the_same_study_may_come_again_with_more_runs_and_never_has_fewer(tmp_path):
@@ -188,9 +180,6 @@ def test_what_is_no_study_of_this_version_says_so(store):
     ):
         said = message(lambda path=path: Store.open(path))
         assert words in said and f"'{path}'" in said
-
-
-# What the table says
 
 
 def test_the_table_counts_each_cell_and_lists_the_first_twenty_reasons(tmp_path):

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import errno
 import signal
 import subprocess
@@ -62,9 +60,6 @@ def made(tmp_path_factory):
     return folder, study().run(folder, jobs=2)
 
 
-# What it holds
-
-
 def test_every_run_leaves_its_front_its_seed_and_how_it_converged(made):
     folder, summary = made
     assert summary.finished == 3 and summary.failed == summary.missing == 0
@@ -116,9 +111,6 @@ def test_numbers_do_not_depend_on_who_makes_the_runs(made, tmp_path):
     assert here.finished == 3 and numbers(here).items() <= expected.items() and numbers(apart).items() <= expected.items()
 
 
-# Seeds
-
-
 def test_seeds_depend_on_labels_and_number_alone():
     one = study().cells[0]
     several = study(solvers={"other": Plain(agents=5), "plain": Plain()}, transcriptions=["dfet:2x2", "dfet:3x2"], runs=9)
@@ -130,9 +122,6 @@ def test_seeds_depend_on_labels_and_number_alone():
     assert one.seed(1, 1) == 9144903288234304347
     for given in (None, "dfet:2x2", DFET(2, 2), [DFET(2, 2)], {"glide": DFET(2, 2)}):
         assert study(transcriptions=given).cells[0].labels == ("glide", "dfet:2x2", "plain")
-
-
-# What goes wrong in runs
 
 
 @pytest.fixture(scope="module")
@@ -232,8 +221,6 @@ def test_a_run_goes_on_where_it_was(tmp_path, damaged):
     assert not list((tmp_path / "halved").rglob("*.checkpoint")) and not list((tmp_path / "halved").rglob("*.samples"))
 
 
-# Killed and interrupted
-
 SCRIPT = """
 import signal, sys
 # A shell that starts the tests in the background makes all its children ignore SIGINT.
@@ -283,9 +270,6 @@ def test_a_study_that_is_ended_takes_its_workers_along_and_keeps_what_is_finishe
     assert workers and (number == "SIGKILL" or not any(map(alive, workers)))
     wait_for(lambda: not any(map(alive, workers)))
     assert stamps(tmp_path) == before and {run.status for run in slow().status(tmp_path / "out").runs} == {"finished", "missing"}
-
-
-# Wrong definitions
 
 
 WRONG = (

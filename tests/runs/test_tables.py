@@ -1,7 +1,5 @@
 """Tables: the same numbers as text, CSV and LaTeX."""
 
-from __future__ import annotations
-
 import csv
 import io
 

@@ -1,7 +1,5 @@
 """Solvers that work on terms of their own beside others in one study."""
 
-from __future__ import annotations
-
 import pytest
 from misbehaving import Plain, glide
 from test_study import Inline

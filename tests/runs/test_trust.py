@@ -1,7 +1,5 @@
 """Files that name code, and files that are damaged: nothing of them is run, and none is read as other numbers."""
 
-from __future__ import annotations
-
 import random
 import shutil
 from pathlib import Path

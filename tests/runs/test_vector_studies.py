@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace
@@ -42,9 +40,6 @@ def build(far: float = 2.0):
 def mine(here) -> str:
     (here / "mine.py").write_text(MINE)
     return "mine.py:build"
-
-
-# Studies
 
 
 @pytest.mark.slow
@@ -126,9 +121,6 @@ def _of_a_script(X: np.ndarray) -> dict[str, np.ndarray]:
 
 
 _of_a_script.__module__ = "__main__"
-
-
-# The command line
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """Small problems whose answers are known."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

@@ -3,8 +3,6 @@
 x[j+1] = x[j] + h f(x[j], u[j], t[j], s) on element j, with a constant control; integrals by the same rule. Global errors are of order 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Gauss-Legendre implicit Runge-Kutta, written on its own: to compare with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

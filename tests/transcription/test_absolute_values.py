@@ -1,7 +1,5 @@
 """Integrals of absolute values: smooth for gradient tools where they are minimised or bounded above, the same numbers everywhere else."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Collocation at Gauss, Radau, Lobatto and Chebyshev points: coefficients, orders, equivalences, what a user states and gets."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 from typing import Any
@@ -30,9 +28,6 @@ def tables(points: str, degree: int):
 def exactness(points: str, degree: int) -> int:
     """The highest degree that the quadrature integrates."""
     return {"gauss": 2 * degree - 1, "radau": 2 * degree - 2, "lobatto": 2 * degree - 1, "chebyshev": degree + 1 - degree % 2}[points]
-
-
-# Coefficients
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 5, 8, 40, 60])
@@ -127,8 +122,6 @@ def table_places(table) -> np.ndarray:
     """Where the costates of a table are told."""
     return nodes(table.costate_basis, len(table.costates) - 1)
 
-
-# Orders of convergence
 
 ORDERS = [
     *(("gauss", degree, 2 * degree) for degree in (1, 2, 3)),
@@ -240,9 +233,6 @@ def test_costates_of_a_nonlinear_problem_are_those_of_the_closed_form(method):
     assert len(found.edges) == method.intervals + 1
 
 
-# What a user states
-
-
 @pytest.mark.parametrize("points", ["gauss", "lobatto"])
 def test_bernstein_controls_stay_within_their_bounds_everywhere(points):
     problem = load("goddard")
@@ -292,9 +282,6 @@ def test_dynamics_without_derivatives_are_refused():
     problem.minimize("end", phase.final(x))
     with pytest.raises(ValueError, match="Collocation: phase 'fall': the dynamics have no derivatives"):
         Collocation(2, 3).transcribe(problem)
-
-
-# What a user gets
 
 
 @pytest.mark.slow

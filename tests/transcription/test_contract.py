@@ -1,7 +1,5 @@
 """What a method gets that fulfils the contract and nothing more: explicit Euler (`euler.py`), which no other file knows of."""
 
-from __future__ import annotations
-
 import json
 import pickle
 

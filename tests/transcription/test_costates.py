@@ -1,7 +1,5 @@
 """Costates and the Hamiltonian: against closed forms, and against how the optimum changes with the initial state."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -246,9 +244,6 @@ def test_methods_agree_along_the_whole_way(name):
         assert other == pytest.approx(means[0], abs=0.03 * size)
 
 
-# Jumps at limits of states.
-
-
 @pytest.mark.parametrize(
     "word",
     [
@@ -309,9 +304,6 @@ def test_a_path_constraint_is_as_good_as_a_bound():
         time = trajectory["run"].time
         clear = np.abs(time - 0.5) > 0.13
         assert found["run"]["x"][clear] == pytest.approx(np.where(time < 0.5, 4.8, -4.8)[clear], rel=5e-3)
-
-
-# Several phases.
 
 
 def two_legs(parts: int) -> Problem:

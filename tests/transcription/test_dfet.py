@@ -1,7 +1,5 @@
 """DFET on elements of any lengths, each phase with its own."""
 
-from __future__ import annotations
-
 from math import pi, tan
 
 import casadi as ca
@@ -29,9 +27,6 @@ def rates_of(flight, m: float):
         return oscillator_rates(t, x, phase.control.on_element(j, np.array([tau]))[0], m, phase.tf)
 
     return rates
-
-
-# What it is
 
 
 def test_the_sizes_are_those_of_the_paper():
@@ -70,9 +65,6 @@ def test_boundary_values_converge_with_order_2l_plus_2(basis, order):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * (order + 1), abs=0.35)
 
 
-# Derivatives and shapes
-
-
 def test_violations_name_what_is_violated():
     problem, phase = integrator(final=1)
     phase.path("gate", phase["x"], upper=0.5)
@@ -88,9 +80,6 @@ def test_violations_name_what_is_violated():
     assert max(found.values()) == nlp.evaluate(Z)[1][0]
     Z[0, slot(nlp, "run.u[0,0]")] = 2
     assert nlp.violations(Z[0])["bounds of run.u"] == pytest.approx(0.5)
-
-
-# Integrals, paths, ends
 
 
 @pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
@@ -120,9 +109,6 @@ def test_path_constraints_are_imposed_at_ends_and_nodes():
     times = nlp.unpack(z)["run"].time
     assert np.unique(values.round(12)) == pytest.approx(2 * times), "x = t here"
     assert nlp.unpack(z)["run"]["gate"] == pytest.approx(2 * times)
-
-
-# Data
 
 
 @pytest.mark.parametrize("kind", ["linear", "bspline"])

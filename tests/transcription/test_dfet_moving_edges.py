@@ -1,7 +1,5 @@
 """DFET on elements whose edges are variables of the NLP."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

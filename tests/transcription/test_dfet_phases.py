@@ -1,7 +1,5 @@
 """Phases by DFET: periodic controls, links, durations, guesses, peaks and what a trajectory shows."""
 
-from __future__ import annotations
-
 import itertools
 
 import casadi as ca
@@ -11,8 +9,6 @@ from cases import integrator, oscillator, propagated, slot
 
 from problems import Problem
 from transcription import DFET
-
-# Periodic controls
 
 
 def spinner(**bounds) -> Problem:
@@ -58,9 +54,6 @@ def test_inside_an_element_a_periodic_control_takes_the_short_way(values):
     shown = phase.at(np.linspace(0, 2, 50))["u"]
     assert (shown >= -np.pi - 1e-12).all() and (shown <= np.pi + 1e-12).all()
     assert (phase["u"] >= -np.pi - 1e-12).all() and (phase["u"] <= np.pi + 1e-12).all()
-
-
-# Links
 
 
 def relay(legs: int, jump: float = 0.0) -> Problem:
@@ -137,9 +130,6 @@ def test_durations_are_rows_only_where_the_times_do_not_see_to_it():
     assert labels(t0=(0, 4), tf=(5, 9), duration=(2, 3)) == ["duration of 'run'"]
 
 
-# Guesses
-
-
 def guessed(**values):
     problem, phase = integrator(tf=(1, 3), initial=(-1, 1), final=(2, 4))
     problem.parameter("p", bounds=(0, 4))
@@ -164,9 +154,6 @@ def test_numbers_lines_and_samples_are_guesses():
     C = np.where(np.isnan(nlp.guess), 1.0, nlp.guess)[None]
     phase = nlp.unpack(nlp.first_guess(C)[0])["run"]
     assert phase.states[:, 0] == pytest.approx(phase.time, abs=1e-12)
-
-
-# Peaks
 
 
 def humps(tf: float = 3.0) -> tuple[Problem, object]:
@@ -205,9 +192,6 @@ def test_tighten_sets_peaks_and_nothing_else():
     low[:, k] -= 7
     assert nlp.evaluate(low)[1].min() > 1
     assert np.array_equal(nlp.tighten(loose), Z) and np.array_equal(nlp.tighten(low), Z)
-
-
-# Trajectories
 
 
 def test_time_increases_and_at_interpolates():

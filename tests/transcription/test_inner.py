@@ -1,7 +1,5 @@
 """Inner levels: results, the nearest feasible point, what cannot be, names, starts, and what their work is."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import dataclass, fields
@@ -190,9 +188,6 @@ def test_a_time_limit_gives_a_timeout():
     found = Ipopt(seconds=1e-6).solve(nlp, candidates(nlp, 2))
     assert found.status.tolist() == ["timeout", "timeout"] and (found.violation > 1e-6).all()
     assert found.clocked
-
-
-# Names and strangers
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Newton's method on what propagation leaves: against differences, IPOPT, and small programs whose nearest feasible point is known."""
 
-from __future__ import annotations
-
 import shutil
 import warnings
 from collections.abc import Callable
@@ -215,9 +213,6 @@ def test_a_periodic_control_goes_the_short_way_round(turn: float) -> None:
     assert x[:, own] == pytest.approx(1.0), "what has no period stays at its bound"
 
 
-# When it ends
-
-
 def test_at_a_kink_no_point_is_the_nearest_and_after_patience_a_feasible_one_will_do() -> None:
     # Of q = |p|/20, seen from below, the kink is nearest; on either side the tangent leads across it.
     nlp = plane(lambda p, q: [(q - 0.05 * ca.fabs(p), {"lower": 0.0, "upper": 0.0})])
@@ -274,9 +269,6 @@ def test_overflow_and_slopes_that_are_no_numbers_show_in_the_results_and_warn_no
     assert overflown.status.tolist() == ["infeasible"] * 3 + ["converged"] and (overflown.violation[:3] > 1e290).all()
     # At p = 0 there is no slope to follow; elsewhere the nearest point has one of 1/(2 sqrt(p)).
     assert other.status.tolist() == ["infeasible", "converged", "converged"] and x[0].tolist() == [0.0, 0.0]
-
-
-# Acceleration
 
 
 def steps(anderson: Anderson, x: np.ndarray, s: Callable[[np.ndarray], np.ndarray], count: int) -> list[np.ndarray]:

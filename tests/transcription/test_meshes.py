@@ -1,7 +1,5 @@
 """Where meshes need more, and whether they get it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import casadi as ca
@@ -51,9 +49,6 @@ def errors(nlp, flight):
 def assessed(nlp, z, tolerance=1e-6):
     F = nlp.evaluate(z[None])[0][0]
     return judge(nlp.problem, nlp.unpack(z), Wanted(tolerance, tolerance), F, np.maximum(np.abs(F), 1e-3))
-
-
-# The kernel
 
 
 @st.composite
@@ -112,9 +107,6 @@ def test_the_worst_elements_come_first_where_there_is_little_room():
     assert split(EDGES, {0: [0.0]}, most=3) is EDGES
 
 
-# What it decides from
-
-
 def test_decay_rates_are_those_of_the_function():
     tau = gauss_legendre(9)[0]
 
@@ -150,9 +142,6 @@ def test_quadrature_is_held_against_the_flight():
     assert confirming.elements >= 2 and confirming.order > 1, "where nothing is wrong, a mesh that has all of this one, and more"
 
 
-# Together
-
-
 @pytest.mark.parametrize("method", [DFET(2, 1), DFET(2, 3, basis="bernstein")])
 def test_trajectories_become_as_exact_as_wanted(method):
     """Flown anew on each mesh with the same controls: nothing is optimised, and errors fall all the same."""
@@ -168,9 +157,6 @@ def test_trajectories_become_as_exact_as_wanted(method):
         method, nlp = finer, finer.transcribe(nlp.problem)
         z = nlp.propagate(nlp.interpolate(flight)[None])[0]
     assert simulate(nlp.problem, nlp.unpack(z), rtol=1e-11, atol=1e-12).max_defect < 1e-6
-
-
-# What errors are measured by
 
 
 def test_scales_are_what_a_quantity_does_not_its_bounds():
@@ -209,9 +195,6 @@ def test_elements_are_merged_only_where_both_are_far_better_than_they_need_to_be
     assert merged(edges, 4, good, kept).tolist() == [True, True, False, True, False, True, True]
     assert merged(np.array([0.0, 0.01, 1.0]), 4, good[:2], kept[:3]).all(), "elements of very different lengths stay apart"
     assert merged(edges, 4, np.full(6, 1e-2), kept).all()
-
-
-# Growth
 
 
 @pytest.mark.slow
@@ -282,9 +265,6 @@ def test_a_density_that_is_the_time_gives_square_roots(cells):
     assert found == pytest.approx(np.sqrt(np.arange(21) / 20), abs=1e-14)
 
 
-# Equidistribution
-
-
 @given(densities(), st.integers(1, 40))
 @settings(max_examples=60, deadline=None)
 def test_intervals_have_equal_shares(density, count):
@@ -314,9 +294,6 @@ def test_nothing_but_zeros_is_even_and_no_density_at_all_is_refused():
     for values in (np.zeros((2, 2)), np.array([[1.0, -2.0], [5.0, 5.0]]), np.array([[1.0, np.nan], [5.0, 5.0]])):
         with pytest.raises(ValueError, match="a density must be finite and nowhere negative, and its integral positive"):
             equidistributed(places, values, 3)
-
-
-# Curvature
 
 
 def test_the_curvature_of_a_parabola_and_of_a_circle():

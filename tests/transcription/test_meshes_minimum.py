@@ -1,7 +1,5 @@
 """Costates, and what controls could still gain by the minimum principle: against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

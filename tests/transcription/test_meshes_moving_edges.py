@@ -1,7 +1,5 @@
 """Meshes whose edges move to the switches of controls: synthetic ones are found where they are, optima against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Derivatives that are put together from those at points, beside CasADi's of the whole NLP."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """The least violation near a vector: a closed form, conflicts, methods, and where it does not begin."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """The certificate of optimality: residuals and multipliers against closed forms, by hand, and what is left once the states follow."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca
@@ -388,9 +386,6 @@ def test_derivatives_and_values_that_are_no_numbers(broken: str) -> None:
     good, bad = vector(nlp, p=0.5, q=0.5), vector(nlp, p=1.0 if broken == "a constraint" else 0.0, q=1.0)
     assert Linearised.of(nlp, good, ONE) is not None and np.isfinite(optimality(nlp, good, ONE))
     assert Linearised.of(nlp, bad, ONE) is None and optimality(nlp, bad, ONE) == np.inf
-
-
-# What `steepest` finds in general
 
 
 @pytest.mark.parametrize("small", [1.0, 1e-3, 1e-4])

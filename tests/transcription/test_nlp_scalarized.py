@@ -1,7 +1,5 @@
 """One gradient solve: known answers for every form of scalarisation, and what it does where there is none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Sizes grow in proportion: entries, instructions and memory, which no clock has to tell."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np

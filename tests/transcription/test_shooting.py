@@ -1,7 +1,5 @@
 """Shooting, single and multiple, on equal intervals and others: against scipy, closed forms, and itself."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import casadi as ca
@@ -70,9 +68,6 @@ METHODS = [
 ]
 
 
-# The flight
-
-
 @pytest.mark.parametrize("scheme", ["midpoint", "kutta3", "rk38", "rk8"])
 @pytest.mark.parametrize("method", [lambda n, **more: SingleShooting(n + 1, **more), MultipleShooting], ids=["single", "multiple"])
 def test_errors_of_states_and_integrals_fall_with_the_order(method, scheme):
@@ -116,9 +111,6 @@ def test_derivatives_of_the_reduced_problem(method):
     total_derivatives(nlp, nlp.first_guess(candidates(nlp, 2, seed=4)))
 
 
-# Meshes and controls
-
-
 @given(st.integers(1, 9), st.integers(1, 4), st.integers(2, 12))
 @settings(max_examples=60, deadline=None)
 def test_no_step_leads_across_a_node_of_the_controls(intervals, steps, nodes):
@@ -157,9 +149,6 @@ def test_periodic_controls_go_the_short_way_round(kind):
     assert np.abs(shown).max() <= np.pi + 1e-12 and np.cos(shown) == pytest.approx(np.cos(straight(fine)), abs=1e-9)
 
 
-# What constraints and peaks see
-
-
 def bump() -> Problem:
     """x = t - 1 in 2 time units; exp(-40 (x - 0.25)^2) is largest, 1, at t = 1.25."""
     problem = Problem("bump")
@@ -189,9 +178,6 @@ def test_paths_and_peaks_are_looked_at_at_nodes_and_where_asked_between(method):
     assert [violation for _, violation in seen.values()] == pytest.approx(excess, abs=1e-12)
 
 
-# Solving
-
-
 @pytest.mark.slow
 def test_goddard_against_its_closed_form():
     nlp = MultipleShooting(40, control="linear").transcribe(load("goddard"))
@@ -218,9 +204,6 @@ def test_the_inner_levels_find_feasible_flights(method, defect):
         assert max(simulate(nlp.problem, nlp.unpack(z)).max_defect for z in found.z[:3]) < defect
     # Newton's steps may end at a point that is a little farther than the nearest one: here by 0.0012 of a span.
     assert quick.moved == pytest.approx(nearest.moved, abs=2e-3)
-
-
-# Trajectories
 
 
 @pytest.mark.parametrize(("kind", "scheme"), [("linear", "euler"), ("constant", "rk4"), ("spline", "rk8")])
@@ -262,9 +245,6 @@ def on(edges=EDGES, **more) -> MultipleShooting:
     return MultipleShooting(3, mesh={"swing": (edges, TABLEAUX[more.get("scheme", "rk4")].order)}, **more)
 
 
-# Equal intervals, and others
-
-
 @pytest.mark.parametrize(("count", "kind", "nodes"), [(6, "constant", None), (49, "linear", 10), (6, "spline", 4)])
 def test_a_mesh_of_equal_intervals_is_the_same_bits(count, kind, nodes):
     more = {"control": kind, "control_nodes": nodes, "steps": 3}
@@ -303,9 +283,6 @@ def test_a_flight_is_what_scipy_makes_of_the_same_controls(kind, nodes):
 def test_derivatives_of_the_reduced_problem_on_uneven_intervals():
     nlp = on(control="spline", control_nodes=4, steps=2).transcribe(oscillator())
     total_derivatives(nlp, nlp.first_guess(candidates(nlp, 2, seed=4)))
-
-
-# Steps that are too long
 
 
 def lag(rate: float, tf: object = 100.0) -> Problem:

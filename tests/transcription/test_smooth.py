@@ -1,7 +1,5 @@
 """Smooth first candidates: about the guess, within bounds, correlated in time, from the generator that is given."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -93,9 +91,6 @@ def test_smoothing_keeps_the_variance_and_a_short_length_everything() -> None:
 def test_settings_that_make_no_sense(settings) -> None:
     with pytest.raises(ValueError, match=f"Smooth: {next(iter(settings))} must be"):
         Smooth(**settings)
-
-
-# Solvers that begin with them
 
 
 def test_an_unknown_start_is_refused_before_any_work() -> None:

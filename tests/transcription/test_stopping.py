@@ -1,7 +1,5 @@
 """Work that is to end early: what was solved comes back, the rest is a timeout."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from cases import candidates

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 import casadi as ca
@@ -76,9 +74,6 @@ def test_violations_of_paths_constraints_bounds_and_ends_are_named():
     assert check.violation == max(check.violations.values())
 
 
-# Phases
-
-
 def two_legs(jump: float) -> Problem:
     problem = Problem("legs")
     legs = []
@@ -112,9 +107,6 @@ def test_linked_phases_are_simulated_from_where_the_first_ended():
     assert second.edge_states[0, 0] == first.edge_states[-1, 0] != flight["leg 1"].edge_states[0, 0]
     assert second.edge_states[0, 1] == flight["leg 1"].edge_states[0, 1], "what is not linked starts where the trajectory says"
     assert other.defect["leg 1"]["x"] > 1e-3 and other.violations["constraint 'drop'"] > 1e-3
-
-
-# Trouble
 
 
 @pytest.mark.parametrize(("a", "finite"), [(300.0, True), (1000.0, False)])
@@ -164,9 +156,6 @@ def test_bad_settings_are_refused(options):
         simulated(nlp, z, **options)
 
 
-# Between nodes
-
-
 def overshooting(basis: str):
     problem, phase = integrator()
     phase.path("push", phase["u"] + 0 * phase["x"], upper=1.2)
@@ -190,9 +179,6 @@ def test_bernstein_does_not_overshoot():
     nlp, z = overshooting("bernstein")
     assert excursions(nlp.problem, nlp.unpack(z)) == {}
     assert simulated(nlp, z).violation == 0
-
-
-# Several at once
 
 
 @pytest.mark.slow

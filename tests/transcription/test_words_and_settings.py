@@ -1,7 +1,5 @@
 """Methods as users write them: words of the command line, settings, meshes, files; and what is no method, in the user's words."""
 
-from __future__ import annotations
-
 import json
 import pickle
 

@@ -6,8 +6,6 @@ Searches of 100 times the paper's budget find the branches. Then the least heat 
 efficiency, with its two parts and the lift over drag as smooth limits, from the nearest points that are known.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from pathlib import Path

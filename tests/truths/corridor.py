@@ -7,8 +7,6 @@ trial is a flight in the simplified equations of `passage`, over time. The table
 passages from the exit with steps that were a little long: it differs by 0.001 deg up to a lift over drag of 0.8, and by 0.012 deg at 0.9.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Callable

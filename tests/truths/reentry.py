@@ -12,8 +12,6 @@ optimal there as well and are taken over, and they pass all zones on a side that
 solved. The first case in turn takes over those points of the other tables that its own do not dominate; all of them are feasible in it.
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from importlib.resources import files

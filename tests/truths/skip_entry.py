@@ -5,8 +5,6 @@
 A sweep on the case's own mesh between the ends of the front; points that a simulation does not confirm are left out.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -6,8 +6,6 @@ Two steps: the shape that the paper prints, then the bank profile of least delta
 limit. One step: shape and bank profile together, as much better as can be by the same share of all three objectives.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 

@@ -1,8 +1,6 @@
 """Constraints as presented to algorithms, against the definition of constrained dominance; degrees against hand-computed cases of eqs.
 (16)-(18) of Chai and others (2020)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -46,9 +44,6 @@ def test_the_three_ways_by_hand(handling, expected, beyond):
     assert all(np.array_equal(one, other) for one, other in zip(doubled, same, strict=True))
 
 
-# Degrees
-
-
 def test_a_heating_rate_and_a_pressure_by_hand() -> None:
     """Limits 200 and 280: rates of 250, 300, 500 and 900, pressures of 280, 350, 560 and 1400."""
     v = np.array([[250, 280], [300, 350], [500, 560], [900, 1400]]) / [200, 280] - 1
@@ -90,9 +85,6 @@ def test_a_degree_is_none_exactly_where_a_point_is_feasible_and_never_falls_with
     assert (more >= found).all()
     if name in ("sum", "log"):
         assert (more > found).all()
-
-
-# Solvers
 
 
 def two_limits(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,5 @@
 """MOPSO: its kernels by hand and by properties, its archive, constraints, periodic variables, first particles, known fronts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from boxes import boxed
@@ -18,9 +16,6 @@ from macs.pareto.dominance import nondominated
 
 PLAIN = UnitBox(np.zeros(2), np.ones(2), np.zeros(2, dtype=bool))
 ROUND = UnitBox(np.zeros(2), np.ones(2), np.array([True, False]))
-
-
-# The grid
 
 
 def test_hypercubes_by_hand() -> None:
@@ -71,9 +66,6 @@ def test_thinning_levels_what_there_is(numbers, limit, seed) -> None:
         assert after[cut].min() >= after.max() - 1
 
 
-# Particles
-
-
 def test_velocities_by_hand() -> None:
     """The sign that eq. (22) is printed with would drive particles away from what they follow."""
     X, V, best, leader = (np.array([row]) for row in ([0.5, 0.5], [0.1, -0.1], [0.7, 0.5], [0.5, 0.1]))
@@ -110,9 +102,6 @@ def test_the_best_place_of_a_particle() -> None:
     assert improved(F, best, np.array([False, True, True, False])).tolist() == [True, False, True, False]
 
 
-# The swarm
-
-
 def schaffer(X: np.ndarray) -> np.ndarray:
     return np.stack([(X**2).sum(axis=1), ((X - 1) ** 2).sum(axis=1)], axis=1)
 
@@ -133,9 +122,6 @@ def test_what_always_holds_of_its_archive(particles, archive, cells, seed) -> No
         ever.append(state.archive.F)
         assert nondominated(state.archive.F).all()
     assert box.counts.evaluations == 90
-
-
-# First particles
 
 
 def ring(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -179,9 +165,6 @@ def test_a_search_that_finds_too_few_ends_with_its_share_and_the_swarm_flies_the
 def test_without_a_search_for_feasible_particles_none_are_drawn(more) -> None:
     box, method = boxed(ring, [(-2, 2)] * 2), MOPSO(particles=10, **more)
     assert method.begin(box, 1000, np.random.default_rng(1)).launched == 10
-
-
-# Fronts
 
 
 @pytest.mark.parametrize("kind", [1, 2])

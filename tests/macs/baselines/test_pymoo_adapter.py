@@ -1,7 +1,5 @@
 """The baselines: pymoo's own bits, states that are data, exact budgets, failures, constraints, moved points, starts, known fronts."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from dataclasses import replace
@@ -181,9 +179,6 @@ def tied(share: float, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.round(schaffer(X)), np.round(X[:, :1] + share)
 
 
-# Runs
-
-
 def constrained(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Feasible in a ring that few first candidates are in."""
     return schaffer(X), np.abs(((X - 0.5) ** 2).sum(axis=1, keepdims=True) - 1) - 0.1
@@ -248,9 +243,6 @@ def test_feasible_points_come_before_infeasible_ones_at_any_size_of_numbers(sett
     assert front.F[:, 1].min() <= 0.6e9  # 0, at x = (1, 1, 1)
 
 
-# Starts, moved points, trajectories
-
-
 @pytest.mark.parametrize("settings", SMALL, ids=named)
 @pytest.mark.parametrize("count", [1, 30])
 def test_a_start_is_evaluated_first_and_is_of_use(settings: Any, count: int) -> None:
@@ -306,9 +298,6 @@ def test_they_solve_a_problem_of_trajectories(settings: Any) -> None:
     assert (front.violation <= 1e-6).all()
     again = settings.solve(problem, mesh, evaluations=15, seed=2, start=front)
     assert again.F[:, 0].min() <= front.F[:, 0].min() + 1e-6
-
-
-# What is refused
 
 
 REFUSED: list[tuple[type, dict[str, Any], str]] = [
@@ -383,9 +372,6 @@ def test_the_whole_front_of_a_population_holds_the_nearest_to_the_directions_and
     assert len(nearest) < len(whole) and {tuple(F) for F in nearest.F} <= {tuple(F) for F in whole.F}
 
 
-# What each has of its own
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["smsemoa", "agemoea2", "rvea", "ctaea"])
 @pytest.mark.parametrize(("plain", "evaluations", "limit"), [(zdt(1), 3000, 0.5), (dtlz(2, 3), 2000, 0.15)], ids=["zdt1", "dtlz2"])
@@ -396,9 +382,6 @@ def test_they_come_near_known_fronts(name: str, plain: Any, evaluations: int, li
     function, bounds, truth = plain
     found = solver(name, population=36).minimize(function, bounds, evaluations=evaluations, seed=1)
     assert mean_distance(truth[::5], found.F) < limit
-
-
-# SMS-EMOA
 
 
 def test_failed_members_have_no_part_in_the_ranges_of_objectives() -> None:
@@ -422,9 +405,6 @@ def test_failed_members_have_no_part_in_the_ranges_of_objectives() -> None:
     assert len(largest) == 2 and max(largest) < 100
 
 
-# AGE-MOEA-II
-
-
 @pytest.mark.slow
 def test_a_front_whose_points_are_all_equal_is_no_model() -> None:
     pytest.importorskip("numba")
@@ -440,9 +420,6 @@ def test_without_numba_it_is_refused_and_nothing_else_is(monkeypatch: pytest.Mon
         solver("agemoea2")
     assert solver_class("agemoea2") is AGEMOEA2
     assert len(SMSEMOA(population=12).minimize(schaffer, CUBE, evaluations=24, seed=1))
-
-
-# RVEA
 
 
 def test_progress_is_that_of_pymoo_by_generations_or_by_evaluations() -> None:
@@ -463,9 +440,6 @@ def test_vectors_are_not_adapted_to_an_objective_that_is_always_the_same() -> No
     state = run(RVEA(divisions=6), boxed(function, CUBE), 28 * 20)
     assert np.isfinite(state.vectors).all()
     assert len(state.archive) >= 5
-
-
-# C-TAEA
 
 
 def test_the_two_archives_are_full_and_only_the_first_has_to_be_feasible() -> None:

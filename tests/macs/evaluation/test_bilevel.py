@@ -1,8 +1,6 @@
 """Trajectories as a search evaluates them: each constraint's violation, and work, which evaluations and gradient solves count alike:
 iterations of IPOPT times variables of its program."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

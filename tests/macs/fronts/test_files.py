@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import csv
 import errno
 import gzip
@@ -172,9 +170,6 @@ def test_data_that_cannot_be_written_down_has_to_be_passed_again(tmp_path):
     assert Front.load(tmp_path / "a.nc").source.address == ""
 
 
-# Writing
-
-
 def test_saving_replaces_a_front_while_another_is_read_from_it(tmp_path):
     path = tmp_path / "front.nc"
     flights(2).save(path)
@@ -252,9 +247,6 @@ def test_a_full_disk_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch, st
     assert caught.value.errno == errno.ENOSPC
     monkeypatch.undo()
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["front.nc"]
-
-
-# Reading
 
 
 def test_what_cannot_be_read_says_why(tmp_path):
@@ -532,9 +524,6 @@ def test_forged_files_are_refused_in_one_line(tmp_path, name):
     assert "\n" not in str(caught.value) and "does not hold a front that can be read" in str(caught.value)
 
 
-# The problem
-
-
 def save_with(path: Path, address: str, **data) -> None:
     flights(1, problem=ProblemSource("two legs", compiled().fingerprint, address, data)).save(path)
 
@@ -583,9 +572,6 @@ def test_a_front_takes_its_own_problem_or_one_of_the_catalogue(tmp_path):
         save_with(tmp_path / "front.nc", address)
         with pytest.raises(ValueError, match=r"the front belongs to problem 'two legs' \(.*\), not to 'goddard'"):
             Front.load(tmp_path / "front.nc").compiled()
-
-
-# Tables of values
 
 
 TIMES = ["climb: t0 [s]", "climb: tf [s]", "coast: t0 [s]", "coast: tf [s]"]

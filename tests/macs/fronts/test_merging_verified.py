@@ -1,7 +1,5 @@
 """Merged fronts of points of which some are verified, some are not, and some were not simulated."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

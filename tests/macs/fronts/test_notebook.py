@@ -1,7 +1,5 @@
 """What fronts, points, trajectories and studies show in notebooks."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

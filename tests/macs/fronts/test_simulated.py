@@ -1,7 +1,5 @@
 """A front as simulated by an independent integrator, with its own and with other problem data."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

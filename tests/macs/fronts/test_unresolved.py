@@ -1,7 +1,5 @@
 """Whether the Hamiltonian shows which meshes do not resolve an optimum, on optima that are published."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -3,8 +3,6 @@
 What a simulation finds of them is what marks points as verified: `test_verified.py`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -26,8 +24,6 @@ from transcription.inner import Projection
 
 NEAR = pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
 """A little less than a tolerance, and a little more."""
-
-# Of a whole search
 
 
 @pytest.fixture(scope="module")
@@ -104,9 +100,6 @@ def test_a_phase_without_duration_verifies(tmp_path, scheme):
     front.save(tmp_path / "front.nc")
     assert verify(Front.load(tmp_path / "front.nc", problem), tolerance=1e-3)[point.index].ok
     point.plot()
-
-
-# What a simulation finds
 
 
 @NEAR
@@ -237,9 +230,6 @@ def test_what_did_not_converge_or_has_no_trajectory_fails_and_an_earlier_verdict
     (check,) = verify(sledge().replace(trajectories=[None]), tolerance=1e9)
     assert (check.mismatch, check.defect, check.simulated, check.missed) == (np.inf,) * 4
     assert check.reasons == ("stored phases differ from the decision vector by inf",)
-
-
-# Rows of vector problems
 
 
 def rows(X: list[list[float]], **changes: Any) -> Front:

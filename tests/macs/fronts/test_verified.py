@@ -1,7 +1,5 @@
 """Points marked by a simulation: scales, notes, and what is not simulated. x' = u is integrated exactly by every method that is used."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -38,9 +36,6 @@ def test_what_agrees_and_is_feasible_is_verified_and_what_cannot_be_simulated_is
     front = black_box(4)
     again = front.verify()
     assert again is front and [point.verified for point in again] == [None] * 4 and "verified" not in again.table()
-
-
-# What counts as one
 
 
 @NEAR
@@ -112,9 +107,6 @@ def test_controls_may_not_leave_their_bounds_between_nodes():
     assert outside.note.startswith("simulated, it violates bounds of run.u by") and ", " not in outside.note.removeprefix("simulated, ")
 
 
-# Marks and notes
-
-
 def test_notes_of_an_earlier_simulation_are_replaced():
     front = slowed(points(cart(), *constant(1.0)), 0.01).replace(notes=["solved twice"])
     strict = front.verify()
@@ -162,9 +154,6 @@ def test_an_error_of_one_element_in_the_middle_is_not_called_unstable():
     assert not point.verified and "its states differ by" in point.note and "unstable" not in point.note
 
 
-# What is not simulated
-
-
 def test_none_means_that_nothing_is_simulated():
     front = MACS(agents=4, archive=4).solve(cart(), MESH, evaluations=40, seed=1, verify=None)
     assert len(front) and not front.was_simulated.any() and not front.verified.any() and "verify" not in front.stats
@@ -184,9 +173,6 @@ def test_a_tolerance_is_a_positive_number(wrong):
     ):
         with pytest.raises(ValueError, match="verify must be a positive number"):
             call(wrong)
-
-
-# After a search
 
 
 def test_a_search_is_not_lost_if_its_points_cannot_be_simulated(monkeypatch, caplog):
@@ -210,9 +196,6 @@ def test_tables_set_apart_what_is_not_verified():
     assert lines[at + 1].endswith("not verified") and any(line.startswith("2 of 3 points are verified. front.mended() ") for line in lines)
     assert "Point 1: simulated, its 'distance' differs by 0.1 m." in lines
     assert "The point is not verified." in found[[1]].table() and "None of 2 points is verified." in found[[1, 1]].table()
-
-
-# Simulations that are made once
 
 
 def test_a_trajectory_is_simulated_once(monkeypatch):

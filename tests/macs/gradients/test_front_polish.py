@@ -1,7 +1,5 @@
 """A front of whichever solver and transcription, brought down by gradients on another."""
 
-from __future__ import annotations
-
 import signal
 
 import numpy as np

@@ -3,8 +3,6 @@
 Bryson and Ho, "Applied Optimal Control", 1975, section 3.11: least effort is 4 / (9 l) where the height may not exceed l <= 1/6.
 """
 
-from __future__ import annotations
-
 import signal
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Starts of gradient solves: of what kinds they are, when there are enough, and that the best of many valleys is found."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

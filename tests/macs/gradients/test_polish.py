@@ -1,7 +1,5 @@
 """Refinement by gradients: guarded, counted, certified; on an evaluator with a known front, and on trajectories."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

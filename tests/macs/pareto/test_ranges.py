@@ -1,7 +1,5 @@
 """Ranges, and what counts as equal, better and no worse in units of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

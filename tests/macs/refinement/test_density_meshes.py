@@ -1,7 +1,5 @@
 """Intervals of multiple shooting that follow the trajectory, from mesh to mesh."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -32,9 +30,6 @@ def method_of(point) -> MultipleShooting:
     return from_dict(point.transcription)
 
 
-# As many intervals as before
-
-
 @pytest.mark.slow
 def test_layers_at_equal_numbers_of_intervals():
     """The cost of the two layers is a closed form; between them nothing happens."""
@@ -56,9 +51,6 @@ def test_elements_of_other_methods_move_too():
     mesh = method_of(dense).mesh_of(next(iter(dense.trajectory)))
     assert (mesh.elements, mesh.order) == (20, 2) and len(set(np.round(np.diff(mesh.edges), 6))) > 10
     assert defect(problem, dense) < defect(problem, even)
-
-
-# As many as it takes
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """Mesh refinement of a front: an independent simulation confirms every point."""
 
-from __future__ import annotations
-
 import signal
 
 import casadi as ca

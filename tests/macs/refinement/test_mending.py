@@ -1,7 +1,5 @@
 """Points that a simulation does not confirm are solved again; the ascent's least time has a closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from smooth_problems import bryson_denham, time_against_effort

@@ -1,7 +1,5 @@
 """What mesh refinement reports is so: ends are kept, optima are right, and nothing is a success that is worse than what came in."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import casadi as ca

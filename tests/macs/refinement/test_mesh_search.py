@@ -1,7 +1,5 @@
 """Meshes that are found where none is given: for a search, and for a single optimum; honest where no solve converges."""
 
-from __future__ import annotations
-
 import gc
 from itertools import pairwise
 

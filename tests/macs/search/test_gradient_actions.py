@@ -1,7 +1,5 @@
 """What a search begins with where none of its first candidates is feasible."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

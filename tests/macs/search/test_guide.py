@@ -1,7 +1,5 @@
 """Searches that a preference guides: on closed fronts, dense where it is good, and the same bits again."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """A search that ends where nothing is feasible, and what it says of that."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

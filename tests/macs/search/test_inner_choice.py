@@ -1,7 +1,5 @@
 """How MACS chooses among inner solvers: which gets the next proposals, and what points bring to a front."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 

@@ -1,7 +1,5 @@
 """A search without a number of evaluations: when its rounds count as progress, and when it ends."""
 
-from __future__ import annotations
-
 import os
 import signal
 from dataclasses import replace
@@ -40,9 +38,6 @@ def after(known: Rounds, found: np.ndarray, evaluations: int, multimodal: bool =
     return next_round(known, found, np.empty((0, 2)), np.inf, EVERY, evaluations, work, True, multimodal, ceiling)
 
 
-# What is progress
-
-
 def test_points_on_the_lines_between_points_are_no_progress():
     coarse = QUARTER[::8]
     middle = 0.5 * (coarse[:-1] + coarse[1:])
@@ -74,9 +69,6 @@ def test_a_front_of_one_point_is_measured_by_what_was_seen():
     best = np.array([[3.0, 5.0]])
     assert not improves(best - 1e-7 * extent, best, extent, EVERY)
     assert improves(best - 1e-2 * extent, best, extent, EVERY)
-
-
-# When it ends
 
 
 def test_one_objective_is_measured_by_its_size_where_all_that_was_seen_is_alike():
@@ -130,9 +122,6 @@ def test_only_the_violation_counts_as_long_as_nothing_is_feasible():
     first = later(Rounds.first(2, True, 10**6), 1.0, FIRST)
     assert first.improved == FIRST and not len(first.front)
     assert later(first, 0.5, 2 * FIRST).improved == 2 * FIRST and later(first, 0.95, 4 * FIRST).stopped == DONE
-
-
-# Searches
 
 
 def vector(X: np.ndarray) -> np.ndarray:

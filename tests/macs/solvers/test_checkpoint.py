@@ -1,7 +1,5 @@
 """Runs that end before their time and go on from a checkpoint: they end with the bits of runs that never stopped."""
 
-from __future__ import annotations
-
 import errno
 import logging
 import os
@@ -90,9 +88,6 @@ class Counted:
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     return tmp_path / "run.ckpt"
-
-
-# Going on
 
 
 SOLVERS = [
@@ -388,9 +383,6 @@ def test_kill_9_in_the_polish(tmp_path) -> None:
     assert_same(Front.load(tmp_path / "front.nc"), solved())
 
 
-# Checkpoints of another run
-
-
 @pytest.mark.parametrize(
     ("other", "message"),
     [
@@ -434,9 +426,6 @@ def test_a_function_of_other_objectives_is_refused(file) -> None:
     minimize(checkpoint=file, callback=after(2))
     with pytest.raises(ValueError, match="function returned 3, 2 expected"):
         minimize(checkpoint=file, f=lambda X: X[:, :3])
-
-
-# Files that are refused
 
 
 FORGED: list[tuple[str, dict[str, Any], str]] = [

@@ -121,9 +121,6 @@ class Clock:
         return self.now
 
 
-# There and back
-
-
 @pytest.mark.parametrize("seed", [None, 3])
 def test_what_was_kept_comes_back(path: Path, seed: int | None) -> None:
     how = kept(counts=replace(Counts(), evaluations=17, failures=Counter(timeout=2)))
@@ -169,9 +166,6 @@ def test_a_state_is_kept_as_it_was_when_it_was_noted(path: Path) -> None:
         made(path, {"bounds": [math.nan, 1.0]}).read(3)
 
 
-# When it is written
-
-
 def test_writes_are_a_while_apart(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """At least `WRITE_SECONDS`, from the beginning on, and at least `WRITE_SHARE` times as long as the last write took."""
     clock = Clock(monkeypatch)
@@ -198,9 +192,6 @@ def test_writes_are_a_while_apart(path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert not after(0.9 * WRITE_SHARE * took) and after(0.2 * WRITE_SHARE * took)
 
 
-# Disks that are full
-
-
 @pytest.mark.parametrize(
     ("error", "reason"),
     [(OSError(errno.ENOSPC, "No space left on device"), "No space left on device"), (OSError("the tape is stuck"), "the tape is stuck")],
@@ -222,9 +213,6 @@ def test_a_write_that_fails_is_logged_once_and_tried_again(
     assert one.failure == f"{reason}; the file is behind" and not path.exists()
     one.write()
     assert one.failure == "" and made(path).read(3) is not None
-
-
-# Other versions
 
 
 def test_other_versions_are_told_with_the_name_of_the_file_and_remembered(
@@ -249,9 +237,6 @@ def test_other_versions_are_told_with_the_name_of_the_file_and_remembered(
     assert back.mixed, "what the other ones did remains part of the run"
 
 
-# Runs of others
-
-
 OTHERS: list[tuple[dict[str, Any], str]] = [
     (
         BELONGS | {"evaluations": 200},
@@ -274,9 +259,6 @@ def test_another_run_is_refused_with_what_differs_and_what_to_do(path: Path, bel
         made(path, belongs).read(3)
     assert str(caught.value).startswith(f"'{path}' belongs to another run: {words}")
     assert str(caught.value).endswith("make the call that it belongs to, name another file, or delete this one")
-
-
-# Files that were forged
 
 
 ZEROS = plain(np.zeros((4, 3)))
@@ -337,9 +319,6 @@ def test_what_is_no_document_is_refused_before_it_takes_memory(path: Path, conte
         assert tracemalloc.get_traced_memory()[1] < 2e7
     finally:
         tracemalloc.stop()
-
-
-# States that break the contract
 
 
 @pytest.mark.parametrize(
@@ -436,9 +415,6 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "run.ckpt"
 
 
-# Damaged files
-
-
 def test_damage_is_refused_in_one_line(file, monkeypatch) -> None:
     def minimize(function: Callable[[np.ndarray], np.ndarray]) -> None:
         MACS(agents=4, archive=6).minimize(function, [(0.0, 1.0)] * 3, evaluations=60, seed=1, checkpoint=file)
@@ -471,9 +447,6 @@ def test_what_is_wrong_is_said(file, content, message) -> None:
     file.write_bytes(content)
     with pytest.raises(ValueError, match=f"^{message}"):
         read_file(file)
-
-
-# Paths that are no files
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder", "circle of links"])

@@ -1,7 +1,5 @@
 """Gradient tools as solvers: the same points as the tools, and what studies need of a solver."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from rest_to_rest import DIAGONAL, MESH, RANGES, WIDE_E, WIDE_T, balanced, cart, effort, ends

@@ -1,7 +1,5 @@
 """A solver's state as data and back, through a file: to the last bit, or an error that names the field."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections import Counter

@@ -1,7 +1,5 @@
 """What all solvers share: checks before any work, ends before the budget, and what comes back."""
 
-from __future__ import annotations
-
 import os
 import signal
 import warnings

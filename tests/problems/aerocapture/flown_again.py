@@ -1,7 +1,5 @@
 """Flights over the round planet again, in Cartesian coordinates, by code of its own and from the bank angle alone."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Optimal bank profiles, flown again in Cartesian coordinates, and against bang-bang laws found by roots alone."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

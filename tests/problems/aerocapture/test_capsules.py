@@ -1,7 +1,5 @@
 """Capsules: lift and drag against closed forms and panels, sizes against bodies of revolution, the front of shapes against a grid."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

@@ -1,7 +1,5 @@
 """Shape and bank profile together: kernels as expressions, the entry corridor, and optima flown again beside the two-step design."""
 
-from __future__ import annotations
-
 import casadi as ca
 import flown_again
 import numpy as np

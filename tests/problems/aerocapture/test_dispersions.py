@@ -1,7 +1,5 @@
 """Capsules under dispersions against DOP853 in Cartesian coordinates, roots of other code, and what must hold for any draws."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The passage against backward integration with a root finder, its table against the solver, and both against the paper's figures."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np
