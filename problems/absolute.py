@@ -1,19 +1,29 @@
-"""Absolute values among the terms of an integrand.
+"""Absolute values and norms among the terms of an integrand.
 
-An integral is linear: where an integrand is a sum of terms, each absolute value among them has an integral of its own, and what is left has
-another. Whether an absolute value is minimised, or maximised, can then be decided one by one.
+An integral is linear: where an integrand is a sum of terms, each absolute value or root among them has an integral of its own, and what is
+left has another. Whether one of these is minimised, or maximised, can then be decided one by one.
 """
 
 from __future__ import annotations
 
 import casadi as ca
 
+ROOTS = ca.OP_SQRT, ca.OP_NORM2, ca.OP_NORMF
+"""Operations that are a norm, or may be one."""
+
+
+def radicand(node: ca.MX) -> ca.MX | None:
+    """The expression of which a node is the square root; None if it is none."""
+    if not any(node.is_op(op) for op in ROOTS):
+        return None
+    return node.dep(0) if node.is_op(ca.OP_SQRT) else ca.sumsqr(node.dep(0))
+
 
 def absolute_terms(expr: ca.MX) -> list[tuple[float, ca.MX]]:
-    """Factors and scalar expressions, the sum of whose products is `expr`: one for each absolute value in it, and one for the rest.
+    """Factors and scalar expressions, the sum of whose products is `expr`: one for each absolute value or root in it, and one for the rest.
 
-    Found are `casadi.fabs(...)` and `casadi.norm_1(...)`, also of vectors that are summed up, in sums, differences and multiples by numbers
-    of any depth. Without one of these, the expression itself is the only term.
+    Found are `casadi.fabs(...)` and `casadi.norm_1(...)`, also of vectors that are summed up, `casadi.sqrt(...)` and `casadi.norm_2(...)`,
+    in sums, differences and multiples by numbers of any depth. Without one of these, the expression itself is the only term.
     """
     found: list[tuple[float, ca.MX]] = []
     rest: list[tuple[float, ca.MX]] = []
@@ -22,7 +32,7 @@ def absolute_terms(expr: ca.MX) -> list[tuple[float, ca.MX]]:
     while left:
         factor, node = left.pop()
         inner = _terms(node)
-        if node.is_op(ca.OP_FABS):
+        if any(node.is_op(op) for op in (ca.OP_FABS, *ROOTS)):
             found.append((factor, node))
         elif inner is None:
             rest.append((factor, node))

@@ -242,9 +242,11 @@ class CompiledPhase(Deriving):
     integrands: ca.Function
     peaks: ca.Function
     sizes: ca.Function
-    """Expressions whose absolute values are integrands, ..."""
+    """Expressions whose absolute values, or roots, are integrands, ..."""
     sized: tuple[int, ...]
     """... and which rows of `integrands` these are, as far as they are minimised or bounded above only; ..."""
+    roots: tuple[bool, ...] = ()
+    """... whether they are roots, ..."""
     size_scales: tuple[float, ...] = ()
     """... and how large they mostly are within the bounds."""
 

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from . import checks
-from .absolute import absolute_terms
+from .absolute import absolute_terms, radicand
 from .compiled import CompiledPhase, Limit, Variable, vector_function
 
 _KINDS = ("initial", "final", "integral", "peak")
@@ -164,8 +164,10 @@ class Phase:
         """The integral of an expression of the phase's symbols from t0 to tf, for use in objectives and constraints.
 
         `casadi.fabs(...)` in it, alone or as a term of a sum, times a number or not, is no obstacle to gradients where it is minimised or
-        bounded above: a transcription may write it with bounds on both signs, which are smooth. Other expressions with a kink stay as they
-        are (`casadi.fmax(u, -u)`, `casadi.fabs(u) * x`): write `casadi.fabs(u)`, and `casadi.fabs(u * x)` where x is never negative.
+        bounded above: a transcription may write it with bounds on both signs, which are smooth. So it is with a norm of controls,
+        `casadi.norm_2(...)` or a root, `casadi.sqrt(u**2 + v**2 + 1e-8)`, which has a kink, or nearly, where all of them vanish. Other
+        expressions with a kink stay as they are (`casadi.fmax(u, -u)`, `casadi.fabs(u) * x`): write `casadi.fabs(u)`, and
+        `casadi.fabs(u * x)` where x is never negative.
         """
         terms = absolute_terms(self._expression(expr, f"phase '{self.name}': the expression of integral(...)"))
         (factor, first), *others = ((factor, self._quantity("integral", term)) for factor, term in terms)
@@ -249,7 +251,9 @@ class Phase:
         def function(name: str, expressions: list[ca.MX]) -> ca.Function:
             return vector_function(name, groups, expressions)
 
-        sizes = {row: expr.dep(0) for row, (_, expr) in enumerate(self._quantities["integral"]) if expr.is_op(ca.OP_FABS)}
+        integrands = [expr for _, expr in self._quantities["integral"]]
+        roots = {row: inner for row, inner in enumerate(map(radicand, integrands)) if inner is not None}
+        sizes = roots | {row: expr.dep(0) for row, expr in enumerate(integrands) if expr.is_op(ca.OP_FABS)}
 
         return CompiledPhase(
             name=self.name,
@@ -267,8 +271,9 @@ class Phase:
             path=function("path", [expr for _, expr in self._paths.values()]),
             initials=function("initials", [expr for _, expr in self._quantities["initial"]]),
             finals=function("finals", [expr for _, expr in self._quantities["final"]]),
-            integrands=function("integrands", [expr for _, expr in self._quantities["integral"]]),
+            integrands=function("integrands", integrands),
             peaks=function("peaks", [expr for _, expr in self._quantities["peak"]]),
             sizes=function("sizes", list(sizes.values())),
             sized=tuple(sizes),
+            roots=tuple(row in roots for row in sizes),
         )

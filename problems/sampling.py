@@ -19,6 +19,8 @@ from .compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembere
 
 FEW, MOST = 64, 2048
 """Samples: as many as do where each expression is a number at one of them, and the most."""
+NEARLY = 1e-4
+"""Part of its value at bounds of the controls up to which a radicand is nothing where there are none: its root has a kink there."""
 NEGLIGIBLE = 1e-9
 """Part of the largest value, or slope, up to which a difference is rounding."""
 Labels = Mapping[str, Sequence[str]]
@@ -180,7 +182,8 @@ def refuse_peaks(problem: CompiledProblem) -> None:
 
 
 def with_sizes(problem: CompiledProblem) -> CompiledProblem:
-    """The problem with those `sizes` only, of which the integral is minimised or bounded above and not used otherwise."""
+    """The problem with those `sizes` only, of which the integral is minimised or bounded above and not used otherwise; of roots, those of
+    what nearly vanishes without controls."""
     if not any(phase.sized for phase in problem.phases):
         return problem
     points = samples(problem)
@@ -189,13 +192,24 @@ def with_sizes(problem: CompiledProblem) -> CompiledProblem:
     wrong = {(i, column - first[i]) for _, _, i, column in _wrong(problem, columns, points)}
     phases = []
     for i, phase in enumerate(problem.phases):
-        kept = [k for k, row in enumerate(phase.sized) if (i, row) not in wrong]
+        kinks = _kinks(phase, problem.parameters)
+        kept = [k for k, row in enumerate(phase.sized) if (i, row) not in wrong and kinks[k]]
         inputs = phase.sizes.mx_in()
         sizes = ca.Function("sizes", inputs, [phase.sizes(*inputs)[kept, :]], phase.sizes.name_in(), ["sizes"])
         duration = points[i][1] - points[i][0]
         scales = [float(np.median(points[i][columns[i][k]] / duration)) or 1.0 for k in kept]
-        phases.append(replace(phase, sizes=sizes, sized=tuple(phase.sized[k] for k in kept), size_scales=tuple(scales)))
+        sized, roots = (tuple(of[k] for k in kept) for of in (phase.sized, phase.roots))
+        phases.append(replace(phase, sizes=sizes, sized=sized, roots=roots, size_scales=tuple(scales)))
     return replace(problem, phases=tuple(phases))
+
+
+def _kinks(phase: CompiledPhase, parameters: Sequence[Variable]) -> np.ndarray:
+    """Mask of the phase's `sizes` that are no roots, or roots that without controls are nearly nothing, in the middle of all else."""
+    groups = (phase.states, (phase.t0,), (phase.t0, phase.tf, *parameters))
+    x, t, s = (np.array([0.5 * (v.lower + v.upper) for v in group]) for group in groups)
+    lower, upper = (np.array([getattr(v, side) for v in phase.controls]) for side in ("lower", "upper"))
+    none, *most = (np.array(phase.sizes(x, u, t, s)).ravel() for u in (np.clip(0.0, lower, upper), lower, upper))
+    return ~np.array(phase.roots, dtype=bool) | (none <= NEARLY * np.max(most, axis=0))
 
 
 def _wrong(

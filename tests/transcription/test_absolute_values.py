@@ -66,6 +66,46 @@ def test_two_controls_each_have_their_own():
     assert point.status == "converged" and point.objectives["fuel"] == pytest.approx(2 * 1.0 + 2 * 2 * 0.5, abs=1e-7)
 
 
+@pytest.mark.parametrize(
+    "integral",
+    [
+        lambda phase, u: phase.integral(1 - ca.sqrt(u**2 + 1e-16) / -1) - TIME,
+        lambda phase, u: phase.integral(ca.norm_2(ca.vertcat(3 * u, 4 * u))) / 5,
+    ],
+)
+def test_roots_are_no_obstacle(integral):
+    """To the root of an interior point method's accuracy: at its tip, a cone has no slope."""
+    point = optimize(transfer(integral=integral), DFET(4, 2), starts=1)
+    assert point.status == "converged" and point.objectives["fuel"] == pytest.approx(2.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("method", [DFET(4, 2), MultipleShooting(4, steps=3, control_nodes=9)], ids=str)
+def test_a_norm_of_two_controls_is_no_obstacle(method):
+    """Fuel is the norm of the thrust, which has to be along the line from start to goal: each burn lasts 1, as along one axis."""
+    problem = Problem("plane")
+    phase = problem.phase("push", t0=0.0, tf=TIME)
+    rates, controls = {}, []
+    for axis, part in (("x", 0.6), ("y", -0.8)):
+        phase.state(axis, bounds=(-10, 10), initial=0, final=part * DISTANCE)
+        v = phase.state(f"v{axis}", bounds=(-5, 5), initial=0, final=0)
+        u = phase.control(f"u{axis}", bounds=(-1, 1))
+        rates |= {axis: v, f"v{axis}": u}
+        controls.append(u)
+    phase.dynamics(**rates)
+    thrust = controls[0] ** 2 + controls[1] ** 2
+    phase.path("most thrust", thrust, upper=1.0)
+    problem.minimize("fuel", phase.integral(ca.sqrt(thrust + 1e-10)))
+    point = optimize(problem, method, starts=1)
+    assert point.status == "converged" and point.objectives["fuel"] == pytest.approx(2.0, abs=1e-4)
+    assert point.trajectory["push"].at(np.array([0.5]))["uy"] == pytest.approx(-0.8, abs=1e-3)
+
+
+def test_a_root_that_is_smooth_stays_as_it_is():
+    length = transfer(integral=lambda phase, u: phase.integral(ca.sqrt(1 + u**2)))
+    speed = transfer(integral=lambda phase, u: phase.integral(ca.sqrt(1e-2 + phase["v"] ** 2 + u**2)))
+    assert length.compile().phases[0].sized == speed.compile().phases[0].sized == ()
+
+
 @pytest.mark.parametrize("method", [DFET(3, 2), MultipleShooting(6)], ids=str)
 def test_candidates_are_scored_by_the_absolute_values_themselves(method):
     nlp = method.transcribe(transfer())

@@ -52,8 +52,7 @@ class ElementsPhase(PhaseWriter):
         self.interior = self.X.ravel()
         edges = layout.add_table(prefix, at_edges, 1, elements - 1)[0]
         self.B = np.vstack([ends.initial[None], edges, ends.final[None]])
-        self._sizes = [Variable(f"size[{k}]", -np.inf, np.inf, "", scale) for k, scale in enumerate(phase.size_scales)]
-        self.S = layout.add_table(prefix, self._sizes, elements, len(tables.tau))
+        self.S = layout.add_table(prefix, self.sizes(range(len(phase.sized))), elements, len(tables.tau))
         self.magnitudes = self.S.ravel()
 
     def _controls(self, prefix: str) -> np.ndarray:
@@ -121,9 +120,10 @@ class ElementsPhase(PhaseWriter):
         peaks = samples(phase.peaks, list(range(phase.peaks.size1_out(0))), tables.dense)
         ends = self._controls_at(extended, np.array([-1.0, 1.0]))
         totals = integrands @ ca.DM(np.tile(tables.weights, self.n))
-        if self._sizes:
-            totals = self._with_sizes(totals, pick(extended, self.S), sizes, (share, s), rows)
-        return Written(ends[:, 0], ends[:, -1], totals, peaks, ca.vec(ca.fabs(sizes)))
+        S = pick(extended, self.S)
+        if phase.sized:
+            totals = self._with_sizes(totals, S, (share, s), rows)
+        return Written(ends[:, 0], ends[:, -1], totals, peaks, self.add_sizes(rows, sizes, S, range(len(phase.sized))))
 
     def _spread(self, values: ca.DM | ca.MX, matrix: np.ndarray) -> ca.MX:
         """Columns that stand side by side for each element, times the same matrix for each element."""
@@ -149,11 +149,10 @@ class ElementsPhase(PhaseWriter):
         values = wrapped_controls(unwrapped_law(law, self.phase) @ ca.DM(basis), self.phase)
         return ca.Function("controls", [law], [values]).map(self.n)(U)
 
-    def _with_sizes(self, totals: ca.MX, S: ca.MX, sizes: ca.MX, lengths: tuple[ca.MX, ca.MX], rows: Rows) -> ca.MX:
-        """The integrals, those of absolute values as sums of the variables S (sizes, n k), which are not to be less than these."""
-        self.add_sizes(rows, sizes, S, self.phase.size_scales)
+    def _with_sizes(self, totals: ca.MX, S: ca.MX, lengths: tuple[ca.MX, ca.MX], rows: Rows) -> ca.MX:
+        """The integrals, those of absolute values as sums of the variables S (sizes, n k)."""
         entries = ca.vertsplit(totals)
-        (weighted,) = rows.at_points(times_half_length(self.phase, len(self._sizes)), S, *lengths)
+        (weighted,) = rows.at_points(times_half_length(self.phase, len(self.phase.sized)), S, *lengths)
         for row, one in zip(self.phase.sized, ca.vertsplit(weighted), strict=True):
             entries[row] = one @ ca.DM(np.tile(self.tables.weights, self.n))
         return ca.vertcat(*entries)

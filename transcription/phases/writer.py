@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase
+from problems.compiled import CompiledPhase, Variable
 
 from ..numerics.batched import expanded
 from ..trajectories.limits import paths_and_peaks
@@ -193,11 +193,24 @@ class PhaseWriter(ABC):
             label = f"path '{limit.name}' of '{self.phase.name}'"
             rows.add(samples, limit.lower, limit.upper, limit.scale, label, of=(self.phase.name, "path"))
 
-    def add_sizes(self, rows: Rows, sizes: ca.MX, S: ca.MX, scales: Sequence[float]) -> None:
-        """Add the rows that keep the variables S (n, k), of these scales (n,), from being less than the absolute values of sizes (n, k)."""
-        for sign in (1.0, -1.0):
-            of_all = np.tile(scales, sizes.shape[1])
-            rows.add(sign * sizes - S, -np.inf, 0.0, of_all, f"absolute values in '{self.phase.name}'", propagated=True)
+    def sizes(self, chosen: Sequence[int]) -> list[Variable]:
+        """The variables that stand for absolute values, and for roots, which are never negative."""
+        phase = self.phase
+        return [Variable(f"size[{k}]", 0.0 if phase.roots[k] else -np.inf, np.inf, "", phase.size_scales[k]) for k in chosen]
+
+    def add_sizes(self, rows: Rows, sizes: ca.MX, S: ca.MX, chosen: Sequence[int]) -> ca.MX:
+        """Add the rows that keep the variables S (n, k) from being less than the absolute values, or roots, of the `chosen` sizes (n, k);
+        returns these (n k,)."""
+        plain, roots = ([i for i, k in enumerate(chosen) if self.phase.roots[k] is root] for root in (False, True))
+        scales, label, k = np.array(self.phase.size_scales)[list(chosen)], f"absolute values in '{self.phase.name}'", sizes.shape[1]
+        for sign in (1.0, -1.0) if plain else ():
+            rows.add(sign * sizes[plain, :] - S[plain, :], -np.inf, 0.0, np.tile(scales[plain], k), label, propagated=True)
+        if roots:
+            one = ca.MX.sym("S", len(roots))
+            (squares,) = rows.at_points(ca.Function("squares", [one], [one * one]), S[roots, :])
+            rows.add(sizes[roots, :] - squares, -np.inf, 0.0, np.tile(scales[roots] ** 2, k), label, propagated=True)
+        least = [ca.sqrt(ca.fmax(row, 0.0)) if i in roots else ca.fabs(row) for i, row in enumerate(ca.vertsplit(sizes))]
+        return ca.vec(ca.vertcat(*least)) if least else ca.MX(0, 1)
 
     def trajectory(
         self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial

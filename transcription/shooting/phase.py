@@ -9,7 +9,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase, Variable
+from problems.compiled import CompiledPhase
 
 from ..numerics.batched import CHAIN, Batched, widened, work
 from ..numerics.polynomials import lobatto_nodes
@@ -52,8 +52,7 @@ class ShootingPhase(PhaseWriter):
         points = mesh.steps * len(step.points) + (1.0 not in step.points)
         self.W = layout.add_hidden(points if step.rows else 0, step.rows)
         self._sized = _sized_by_controls(phase) if law.jumps else []
-        sizes = [Variable(f"size[{k}]", -np.inf, np.inf, "", phase.size_scales[k]) for k in self._sized]
-        self.S = layout.add_table(prefix, sizes, law.count, 1)[:, 0]
+        self.S = layout.add_table(prefix, self.sizes(self._sized), law.count, 1)[:, 0]
         self.magnitudes = self.S.ravel()
         self.interior = np.concatenate([self.B[1:-1].ravel(), self.Y.ravel(), self.W.ravel()])
         self.compilable, self.wide = step.symbolic, step.plain
@@ -74,24 +73,24 @@ class ShootingPhase(PhaseWriter):
         seen = pick(extended, self.W)
         self.add_paths(rows, seen[: len(phase.paths), :])
         first, last = self._inputs(extended, 0, 1)[0], self._inputs(extended, self.mesh.steps - 1)[0]
-        integrals, sizes = self._with_sizes(extended, rows)
+        integrals, least = self._with_sizes(extended, rows)
         ends = self.step.controls(first, 0.0), self.step.controls(last, 1.0)
-        return Written(*ends, integrals, seen[len(phase.paths) :, :], ca.vec(ca.fabs(sizes)))
+        return Written(*ends, integrals, seen[len(phase.paths) :, :], least)
 
     def _with_sizes(self, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX]:
-        """The integrals, absolute values that are constant where controls are by variables S, and what these are of, (k, values)."""
+        """The integrals, absolute values that are constant where controls are by variables S, and the least values of these."""
         pick, phase = self.layout.pick, self.phase
         integrals, U = pick(extended, self.Q), pick(extended, self.U)
         if not self._sized:
             return integrals, ca.MX(0, 1)
         S, s = pick(extended, self.S), pick(extended, self.ends.statics)
         sizes = phase.sizes.map(self.law.count)(0, U, 0, ca.repmat(s, 1, self.law.count))[self._sized, :]
-        self.add_sizes(rows, sizes, S, [phase.size_scales[k] for k in self._sized])
+        least = self.add_sizes(rows, sizes, S, self._sized)
         entries = ca.vertsplit(integrals)
         totals = (s[1] - s[0]) * (S @ ca.DM(np.diff(self.law.edges)))
         for k, total in zip(self._sized, ca.vertsplit(totals), strict=True):
             entries[phase.sized[k]] = total
-        return ca.vertcat(*entries), sizes
+        return ca.vertcat(*entries), least
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         return self._arrivals, self.mesh.places[self._shots][1:]
