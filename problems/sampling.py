@@ -198,7 +198,7 @@ def with_sizes(problem: CompiledProblem) -> CompiledProblem:
         sizes = ca.Function("sizes", inputs, [phase.sizes(*inputs)[kept, :]], phase.sizes.name_in(), ["sizes"])
         duration = points[i][1] - points[i][0]
         scales = [float(np.median(points[i][columns[i][k]] / duration)) or 1.0 for k in kept]
-        sized, roots = (tuple(of[k] for k in kept) for of in (phase.sized, phase.roots))
+        sized, roots = tuple(phase.sized[k] for k in kept), tuple(phase.roots[k] for k in kept)
         phases.append(replace(phase, sizes=sizes, sized=sized, roots=roots, size_scales=tuple(scales)))
     return replace(problem, phases=tuple(phases))
 
