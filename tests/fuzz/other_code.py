@@ -7,8 +7,8 @@ from random_flights import PlainPhase, PlainProblem
 from random_terms import numeric
 from scipy.integrate import solve_ivp
 
-TIMES = np.linspace(0.0, 1.0, 21)
-"""Places on an element where paths and peaks are sampled."""
+TIMES, CLOSE_TIMES = np.linspace(0.0, 1.0, 21), np.linspace(0.0, 1.0, 2001)
+"""Places on an element where paths and peaks are sampled, and where there are narrow ones."""
 
 
 def flown(plain: PlainProblem, point: Any) -> tuple[dict[str, float], dict[str, float]]:
@@ -17,6 +17,8 @@ def flown(plain: PlainProblem, point: Any) -> tuple[dict[str, float], dict[str, 
     misses: dict[str, float] = {}
     objectives: dict[str, float] = {}
     trajectory, parameters, before = point.trajectory, point.parameters, None
+    names = [*(name for phase in plain.phases for name, *_ in phase.paths), *(name for name, *_ in plain.objectives)]
+    times = CLOSE_TIMES if any(name.startswith("narrow") for name in names) else TIMES
     for phase in plain.phases:
         arc = trajectory[phase.name]
         states = dict(zip(phase.states, arc.edge_states[0].tolist(), strict=True))
@@ -27,7 +29,7 @@ def flown(plain: PlainProblem, point: Any) -> tuple[dict[str, float], dict[str, 
         y = np.array([*states.values(), *np.zeros(len(integrands))])
         peaks = {name: -np.inf for name, _, kind, its, _ in plain.objectives if its is phase and kind == "peak"}
         for j, (begin, end) in enumerate(zip(arc.state.edges, arc.state.edges[1:], strict=False)):
-            y, seen = _element(phase, arc, j, float(begin), float(end), y, parameters, integrands)
+            y, seen = _element(phase, arc, j, float(begin), float(end), y, parameters, integrands, times)
             expected = arc.edge_states[j + 1]
             for k, (name, (lower, upper)) in enumerate(phase.states.items()):
                 label = f"state {phase.name}.{name}"
@@ -72,6 +74,7 @@ def _element(
     y: np.ndarray,
     parameters: dict[str, float],
     integrands: list[Any],
+    times: np.ndarray,
 ) -> tuple[np.ndarray, list[dict[str, float]]]:
     """The end of an element that begins at y, and all values at some of its places."""
     names = list(phase.states)
@@ -88,10 +91,10 @@ def _element(
     if not np.isfinite(y).all():
         return np.full(len(y), np.nan), []
     sizes = np.array([upper - lower for lower, upper in phase.states.values()] + [1.0] * len(integrands))
-    found = solve_ivp(rates, (0.0, 1.0), y, method="LSODA", t_eval=TIMES, rtol=1e-9, atol=np.maximum(1e-11 * sizes, 1e-14))
-    if not found.success or found.y.shape[1] < len(TIMES):
+    found = solve_ivp(rates, (0.0, 1.0), y, method="LSODA", t_eval=times, rtol=1e-9, atol=np.maximum(1e-11 * sizes, 1e-14))
+    if not found.success or found.y.shape[1] < len(times):
         return np.full(len(y), np.nan), []
-    return found.y[:, -1], [values(float(s), state) for s, state in zip(TIMES, found.y.T, strict=True)]
+    return found.y[:, -1], [values(float(s), state) for s, state in zip(times, found.y.T, strict=True)]
 
 
 def _scale(lower: float, upper: float) -> float:

@@ -5,7 +5,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from random_terms import Term, random_term, symbolic
+from random_terms import Term, random_term, symbolic, with_pulse
 
 from problems import Problem
 from problems.phase import Phase
@@ -40,6 +40,7 @@ def random_flight(seed: int) -> tuple[Problem, PlainProblem, Any]:
     rng = np.random.default_rng(seed)
     problem, plain = Problem(f"random {seed}"), PlainProblem()
     risk = float(rng.choice([0.0, 0.1, 0.4]))
+    pulses = np.random.default_rng([seed, 2])
     parameters = {"p": problem.parameter("p", bounds=_limits(rng))} if rng.random() < 0.3 else {}
     t0 = float(rng.choice([0.0, 0.0, -1.0, 5.0]))
     times = [_end(rng, t0)]
@@ -51,11 +52,15 @@ def random_flight(seed: int) -> tuple[Problem, PlainProblem, Any]:
         begins = t0 if k == 0 else times[0]
         phases.append(problem.phase(f"part {k}", t0=begins, tf=tf))
         plain.phases.append(_filled(rng, phases[-1], parameters, risk, first=k == 0, like=plain.phases[0] if k else None))
+        if pulses.random() < 0.2:
+            _narrow_path(pulses, phases[-1], plain.phases[-1])
     if len(phases) == 2 and rng.random() < 0.8:
         problem.link(*phases)
         plain.linked = True
     for k in range(int(rng.choice([1, 2, 2, 2, 3]))):
         _objective(rng, problem, plain, phases, parameters, risk, f"objective {k}")
+    if pulses.random() < 0.2:
+        _narrow_peak(pulses, problem, plain, phases)
     return problem, plain, _transcription(rng)
 
 
@@ -116,6 +121,30 @@ def _objective(
         expression = getattr(phase, kind)(symbolic(term, symbols))
     getattr(problem, sense)(name, expression)
     plain.objectives.append((name, sense, kind, its, term))
+
+
+def _narrow_path(rng: np.random.Generator, phase: Phase, plain: PlainPhase) -> None:
+    """A path constraint on a state and a pulse."""
+    name = str(rng.choice(list(plain.states)))
+    term, (lower, upper) = _pulsed(rng, name, plain), plain.states[name]
+    limit = lower + float(rng.uniform(0.6, 1.1)) * (upper - lower)
+    phase.path("narrow", symbolic(term, {one: phase[one] for one in plain.states} | {"t": phase.time}), upper=limit)
+    plain.paths.append(("narrow", term, -np.inf, limit))
+
+
+def _narrow_peak(rng: np.random.Generator, problem: Problem, plain: PlainProblem, phases: list[Phase]) -> None:
+    """An objective that is the peak of a state and a pulse."""
+    k = int(rng.integers(len(phases)))
+    phase, its = phases[k], plain.phases[k]
+    term = _pulsed(rng, str(rng.choice(list(its.states))), its)
+    problem.minimize("narrow peak", phase.peak(symbolic(term, {one: phase[one] for one in its.states} | {"t": phase.time})))
+    plain.objectives.append(("narrow peak", "minimize", "peak", its, term))
+
+
+def _pulsed(rng: np.random.Generator, name: str, plain: PlainPhase) -> Term:
+    """A state and a pulse in time or in a state."""
+    where = str(rng.choice(["t", *plain.states]))
+    return with_pulse(rng, ("name", name), where, plain.states.get(where, (0.0, 5.0)))
 
 
 def _limits(rng: np.random.Generator, small: bool = False) -> Limits:

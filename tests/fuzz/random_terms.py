@@ -9,6 +9,8 @@ import numpy as np
 
 Term = tuple[Any, ...]
 """A number, a name, or a function of other terms: ("number", value), ("name", text), or (function, term, ...)."""
+PULSE = 300.0
+"""What the square of a term of size one is multiplied with in a pulse, exp(-PULSE square(...)): that is 0.1 wide."""
 
 SMOOTH = ("+", "-", "*", "sin", "cos", "tanh", "square")
 RISKY = ("/", "exp", "root", "log", "abs", "cube")
@@ -22,6 +24,14 @@ def random_term(rng: np.random.Generator, names: Sequence[str], depth: int, risk
     kind = str(rng.choice(RISKY if rng.random() < risk else SMOOTH))
     count = 2 if kind in "+-*/" else 1
     return (kind, *(random_term(rng, names, depth - 1, risk) for _ in range(count)))
+
+
+def with_pulse(rng: np.random.Generator, term: Term, name: str, limits: tuple[float, float]) -> Term:
+    """The term and a pulse where what has this name is near some value within limits, 1 % to 10 % of these wide."""
+    place, width = rng.uniform(*limits), (limits[1] - limits[0]) * 10.0 ** rng.uniform(-1.0, 0.0)
+    scaled = ("*", ("number", 1.0 / width), ("-", ("name", name), ("number", float(place))))
+    pulse = ("exp", ("*", ("number", -PULSE), ("square", scaled)))
+    return ("+", term, ("*", ("number", float(rng.choice([-1.0, 0.5, 1.0, 2.0]))), pulse))
 
 
 def _number(rng: np.random.Generator) -> float:

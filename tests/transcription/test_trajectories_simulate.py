@@ -215,3 +215,26 @@ def test_what_is_narrower_than_the_gaps_between_samples_is_found(place):
     assert check.objectives["heat"] == pytest.approx(1.0, rel=1e-3)
     assert excursions(nlp.problem, flight) == {"way.post": pytest.approx(radius - distance, rel=1e-2)}
     assert simulate(nlp.problem, flight, rtol=1e-9).trajectory["way"].paths.min() > radius, "no sample shows it"
+
+
+def test_states_controls_paths_and_peaks_have_their_extremes_between_samples():
+    """v' = u of a parabola through (9.2, 10, 9.5); y = 3 t - 4 t^2 and its square; pulses of width 0.006 anywhere in the one element."""
+    problem = Problem("extremes")
+    run = problem.phase("run", t0=0, tf=1)
+    _, y = run.state("v", bounds=(-20, 20), initial=0), run.state("y", bounds=(-2, 0.56), initial=0)
+    run.dynamics(v=run.control("u", bounds=(-10, 10)), y=3 - 8 * run.time)
+    run.path("square", y**2, upper=0.3)
+    places = np.linspace(0.05, 0.95, 37)
+    for k, place in enumerate(places):
+        run.path(f"pulse {k}", ca.exp(-(((run.time - place) / 0.006) ** 2)), upper=0.25)
+        problem.minimize(f"peak {k}", run.peak(y / 10 + ca.exp(-(((run.time - place) / 0.006) ** 2))))
+    nlp = DFET(1, 2).transcribe(problem)
+    flight = nlp.unpack(nlp.propagate(nlp.first_guess(np.array([[9.2, 10.0, 9.5]])))[0])
+    check, found = simulate(nlp.problem, flight), excursions(nlp.problem, flight)
+    # At tf, y is -1 and its square 1: in between, y has its top, 9/16, at t = 3/8.
+    exact = {"u": 0.15**2 / (2 * 1.3) / 20, "y": (9 / 16 - 0.56) / 2.56, "square": 0.7} | {f"pulse {k}": 0.75 for k in range(len(places))}
+    assert found == pytest.approx({f"run.{name}": amount for name, amount in exact.items()}, abs=1e-7)
+    labels = {name: f"bounds of run.{name}" if len(name) == 1 else f"path '{name}' of 'run'" for name in exact}
+    assert {name: check.violations[label] for name, label in labels.items()} == pytest.approx(exact, abs=1e-7)
+    tops = (3 * places - 4 * places**2) / 10 + 1 + (3 - 8 * places) ** 2 * 0.006**2 / 400
+    assert list(check.objectives.values()) == pytest.approx(tops, abs=1e-7)

@@ -10,7 +10,7 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered, verified_scale
 
 from .arcs import METHODS, Arcs
-from .limits import DENSE, excess, largest_on_elements, paths_and_peaks
+from .limits import DENSE, Course, excess
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 
@@ -166,13 +166,12 @@ def _simulation(
 
 @dataclass(frozen=True, eq=False)
 class _SimulatedPhase:
-    """One phase as planned and as simulated, its quantities q, and the excess of its paths and controls."""
+    """One phase as planned and as simulated, its quantities q, and the excess of its states, controls and paths."""
 
     planned: PhaseTrajectory
     trajectory: PhaseTrajectory
     quantities: np.ndarray
-    path_excess: np.ndarray
-    control_excess: np.ndarray
+    excess: np.ndarray
 
     def defect(self, phase: CompiledPhase) -> dict[str, float]:
         # At an end of two elements the trajectory has two values where each element is simulated by itself.
@@ -181,8 +180,7 @@ class _SimulatedPhase:
         return {v.name: _or_infinite(amount) for v, amount in zip(phase.states, difference.max(axis=0), strict=True)}
 
     def violations(self, phase: CompiledPhase) -> dict[str, float]:
-        states, ends = self.trajectory.states, _ends(phase)
-        amounts = [excess(states, phase.states), self.control_excess, self.path_excess, excess(states[-1:], ends)]
+        amounts = [self.excess, excess(self.trajectory.states[-1:], _ends(phase))]
         every = zip(_labelled(phase), np.concatenate(amounts), strict=True)
         return {label: _or_infinite(amount) for (label, _), amount in every if label}
 
@@ -253,22 +251,20 @@ def _start(
 
 def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: np.ndarray, parameters: np.ndarray) -> _SimulatedPhase:
     """A simulated phase from states and integrals (N, len(DENSE), ny) on its elements."""
-    state = PiecewisePolynomial(planned.state.edges, elements[:, :, : len(phase.states)], "lobatto")
-    nx = len(phase.states)
+    nx, nu = len(phase.states), len(phase.controls)
+    state = PiecewisePolynomial(planned.state.edges, elements[:, :, :nx], "lobatto")
     s = np.concatenate([[planned.t0, planned.tf], parameters])
-    times = planned.state.times(DENSE).ravel()
-    states = elements[:, :, :nx].reshape(-1, nx)
-    controls = planned.controls_on_elements(DENSE).reshape(len(times), len(phase.controls))
-    paths, peaks = paths_and_peaks(phase, states, controls, times, s)
-    on_elements = (values.reshape(*elements.shape[:2], values.shape[1]) for values in (paths, peaks))
-    beyond, highest = largest_on_elements(phase, state, planned, s, *on_elements)
+    course = Course(phase, state, planned, s)
+    beyond, highest = course.largest()
     # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
-    kept = np.append(np.arange(len(times) - 1) % len(DENSE) != len(DENSE) - 1, True)
-    trajectory = replace(planned, time=times[kept], states=states[kept], controls=controls[kept], paths=paths[kept], state=state)
+    kept = np.append(np.arange(elements.shape[0] * len(DENSE) - 1) % len(DENSE) != len(DENSE) - 1, True)
+    times, values = state.times(DENSE).ravel()[kept], course.values.reshape(len(kept), -1)[kept]
+    states, controls, paths, _ = np.split(values, np.cumsum([nx, nu, len(phase.paths)]), axis=1)
+    trajectory = replace(planned, time=times, states=states, controls=controls, paths=paths, state=state)
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
     quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], highest.max(axis=0)])
-    return _SimulatedPhase(planned, trajectory, quantities, beyond.max(axis=0), excess(controls, phase.controls))
+    return _SimulatedPhase(planned, trajectory, quantities, beyond.max(axis=0))
 
 
 def _or_infinite(value: float) -> float:
