@@ -31,15 +31,12 @@ class Counted:
         return {"near": x**2 + y**2, "nearness": -((x - 2) ** 2) - y**2, "wall": x}
 
 
-def test_the_front_is_the_known_one_in_the_users_senses(front):
+def test_the_front_is_the_known_one_and_its_points_tables_pictures_and_choices_too(front, tmp_path):
     x = front.decision[:, 0]
     assert len(front) == 10 and (front.status == "converged").all()
     assert np.allclose(front.objectives[:, 1], -((x - 2) ** 2), atol=0.02)
     assert x.min() < 0.05 and 1.45 < x.max() <= 1.5 + 1e-6
     assert front.names == ("near", "nearness") and front.senses == ("minimize", "maximize")
-
-
-def test_points_have_variables_violations_and_are_verified(front):
     point = front[3]
     assert list(point.parameters) == ["x", "y"] and point.trajectory is None and point.transcription is None
     assert point.objectives["near"] == point.parameters["x"] ** 2 + point.parameters["y"] ** 2
@@ -49,6 +46,22 @@ def test_points_have_variables_violations_and_are_verified(front):
     assert again.objectives == point.objectives and again.violation == 0.0 and again.max_defect == 0.0
     table = front.table()
     assert "x" in table and "[m]" in table and "evaluated again, nothing differs" in table and "simulated" not in table
+    front.to_csv(tmp_path / "front.csv")
+    with (tmp_path / "front.csv").open() as file:
+        head, first, *_ = csv.reader(file)
+    assert head[:4] == ["point", "near [m2]", "nearness [m2]", "verified"] and head[5:7] == ["x [m]", "y"] and "defect" not in head
+    assert "near, evaluated again [m2]" in head and float(first[5]) == front[0].parameters["x"]
+    axes = front.plot_variables()
+    assert [ax.get_ylabel() for ax in axes] == ["x [m]", "y"] and axes[0].figure.get_supxlabel() == "near [m²]"
+    drawn = axes[0].collections[0].get_offsets()
+    assert np.allclose(drawn, np.column_stack([front.objectives[:, 0], front.decision[:, 0]]))
+    circled = front[3].plot()[0].collections[-1].get_offsets()
+    assert np.allclose(circled, [[front[3].objectives["near"], front[3].parameters["x"]]])
+    wish = ReferencePoint({"near": 0.5})
+    assert wish.rank(front).best.objectives in [point.objectives for point in front]
+    dialogue = Dialogue(front)
+    dialogue.prefer(wish)
+    assert "black box has no derivatives" in dialogue.choose().message
 
 
 def test_solve_and_minimize_are_one_search():
@@ -92,14 +105,21 @@ def test_failed_rows_are_no_errors():
     none = MACS().solve(parabolas(function=lambda X: dict.fromkeys(("near", "nearness", "wall"), X[:, 0] * np.nan)), evaluations=50, seed=1)
     assert not len(none) and "all of them failed" in none.message
 
-
-def test_an_empty_front_names_the_constraint_and_its_scale():
     def walled(X):
         return {"near": X[:, 0], "nearness": X[:, 1], "wall": 4.5 + 0.0 * X[:, 0]}
 
     found = MACS().solve(parabolas(function=walled), evaluations=60, seed=1)
     assert not len(found) and "the nearest violates wall by 2 of its scale, 1.5 m" in found.message
     assert found.closest is not None and found.closest.violations == {"wall": 2.0}
+
+    class Tired(Counted):
+        def __call__(self, X):
+            if self.rows >= 108:
+                raise RuntimeError("tired")
+            return super().__call__(X)
+
+    found = MACS().solve(parabolas(function=Tired()), evaluations=100, seed=1)
+    assert len(found) and not found.was_simulated.any() and "not simulated, since this failed (RuntimeError: tired)" in found.message
 
 
 def test_a_saved_front_is_evaluated_again_with_its_problem(front, tmp_path):
@@ -140,14 +160,6 @@ def test_other_data_evaluate_the_same_points(front):
         front.simulate(load("goddard"))
 
 
-def test_the_csv_has_units_and_what_was_found_again(front, tmp_path):
-    front.to_csv(tmp_path / "front.csv")
-    with (tmp_path / "front.csv").open() as file:
-        head, first, *_ = csv.reader(file)
-    assert head[:4] == ["point", "near [m2]", "nearness [m2]", "verified"] and head[5:7] == ["x [m]", "y"] and "defect" not in head
-    assert "near, evaluated again [m2]" in head and float(first[5]) == front[0].parameters["x"]
-
-
 def test_what_needs_dynamics_or_derivatives_is_refused_in_one_line(front):
     problem = parabolas()
     word = "'parabolas' is a vector problem, which has no dynamics and no derivatives"
@@ -175,14 +187,6 @@ def test_what_needs_dynamics_or_derivatives_is_refused_in_one_line(front):
             call()
 
 
-def test_choices_are_made_from_known_points(front):
-    wish = ReferencePoint({"near": 0.5})
-    assert wish.rank(front).best.objectives in [point.objectives for point in front]
-    dialogue = Dialogue(front)
-    dialogue.prefer(wish)
-    assert "black box has no derivatives" in dialogue.choose().message
-
-
 def test_a_checkpoint_continues_to_the_same_bits(tmp_path):
     whole = MACS().solve(parabolas(), evaluations=400, seed=5)
     file = tmp_path / "run.ckpt"
@@ -191,23 +195,3 @@ def test_a_checkpoint_continues_to_the_same_bits(tmp_path):
     assert np.array_equal(whole.F, rest.F) and np.array_equal(whole.decision, rest.decision) and rest.verified.all()
     with pytest.raises(Unreadable, match=r"problem.fingerprint"):
         MACS().solve(parabolas(far=3.0), evaluations=400, seed=5, checkpoint=file)
-
-
-def test_a_function_that_fails_in_the_end_loses_no_front():
-    class Tired(Counted):
-        def __call__(self, X):
-            if self.rows >= 108:
-                raise RuntimeError("tired")
-            return super().__call__(X)
-
-    found = MACS().solve(parabolas(function=Tired()), evaluations=100, seed=1)
-    assert len(found) and not found.was_simulated.any() and "not simulated, since this failed (RuntimeError: tired)" in found.message
-
-
-def test_pictures_have_a_panel_for_each_variable(front, tmp_path):
-    axes = front.plot_variables()
-    assert [ax.get_ylabel() for ax in axes] == ["x [m]", "y"] and axes[0].figure.get_supxlabel() == "near [m²]"
-    drawn = axes[0].collections[0].get_offsets()
-    assert np.allclose(drawn, np.column_stack([front.objectives[:, 0], front.decision[:, 0]]))
-    circled = front[3].plot()[0].collections[-1].get_offsets()
-    assert np.allclose(circled, [[front[3].objectives["near"], front[3].parameters["x"]]])

@@ -77,9 +77,6 @@ def test_a_case_from_a_file(case, monkeypatch):
     relative = load(f"{case.name}:problem")
     monkeypatch.chdir("/")
     assert load(relative.address).name == "mine", "the address is found from another folder"
-
-
-def test_a_file_that_changed_is_read_again(case):
     first = load(f"{case}:problem").compile().fingerprint
     case.write_text(CASE.replace("bounds=(0, 10)", "bounds=(0, 123456)"))
     os.utime(case, (1, 1))
@@ -93,9 +90,6 @@ def test_files_of_the_same_name_do_not_disturb_each_other(case, tmp_path):
     assert load(f"{case}:problem").name == "mine"
     assert load(f"{other}:problem").name == "other"
     assert load(f"{case}:problem").name == "mine"
-
-
-def test_what_stands_beside_a_file_can_be_imported(case):
     (case.parent / "beside_the_case.py").write_text("from problems import Problem\n")
     case.write_text("from beside_the_case import Problem\n" + CASE.replace("from __future__ import annotations", ""))
     assert load(f"{case}:problem").name == "mine"

@@ -95,15 +95,6 @@ def test_a_phase_must_last_as_long_as_it_says(times, word):
     refused(lambda: glider(**times)[0].compile(), "descent", word)
 
 
-def test_guesses_within_the_bounds_are_kept():
-    problem, phase = glider()
-    problem.parameter("mass", bounds=(1, 2))
-    phase.guess(height=(0, 10), flap=1, tf=2, t0=0)
-    problem.guess(mass=1)
-    compiled = problem.compile()
-    assert compiled.guesses == {"mass": 1.0} and compiled.phases[0].guesses == {"height": (0.0, 10.0), "flap": 1.0, "tf": 2.0, "t0": 0.0}
-
-
 def test_names_of_one_kind_do_not_disturb_another():
     problem, phase = glider()
     problem.constraint("fuel", phase.tf, upper=9)
@@ -111,9 +102,6 @@ def test_names_of_one_kind_do_not_disturb_another():
     problem.minimize("fuel", phase.tf)
     problem.constraint("descent", phase.tf, upper=9)
     problem.phase("landing", t0=0, tf=1).state("height", bounds=(0, 1))
-
-
-def test_what_was_refused_leaves_nothing_behind():
     problem, phase = glider()
     before = problem.compile().fingerprint
     for action in (
@@ -148,15 +136,18 @@ def test_what_was_stated_can_be_read_back():
     with pytest.raises(TypeError):
         problem.phases["other"] = phase
     assert "descent" in repr(problem) and "height" in repr(phase)
-
-
-def test_signs_are_those_of_the_senses():
     problem, phase = glider()
     problem.maximize("late", phase.tf, unit="s")
     compiled = problem.compile()
     assert compiled.signs.tolist() == [1, -1]
     assert np.array(compiled.objectives([0, 1.5], [])).ravel().tolist() == [1.5, -1.5]
     assert [(goal.name, goal.sense, goal.unit) for goal in compiled.goals] == [("time", "minimize", ""), ("late", "maximize", "s")]
+    problem, phase = glider()
+    problem.parameter("mass", bounds=(1, 2))
+    phase.guess(height=(0, 10), flap=1, tf=2, t0=0)
+    problem.guess(mass=1)
+    compiled = problem.compile()
+    assert compiled.guesses == {"mass": 1.0} and compiled.phases[0].guesses == {"height": (0.0, 10.0), "flap": 1.0, "tf": 2.0, "t0": 0.0}
 
 
 def test_limits_have_units_which_are_labels():
@@ -223,23 +214,17 @@ def relay(count: int = 3) -> tuple[Problem, list[Phase]]:
     return problem, phases
 
 
-def test_links_take_phases_of_this_problem():
+def test_links_take_phases_and_states_of_this_problem_without_circles_or_jumps():
     problem, legs = relay()
     _, stranger = glider()
     for pair in ((legs[0], stranger), (stranger, legs[0]), ("leg 0", legs[1]), (legs[0], None)):
         refused(lambda pair=pair: problem.link(*pair), "relay", "link")
-
-
-def test_links_take_states_of_both_phases():
     problem, legs = relay()
     refused(lambda: problem.link(legs[0], legs[1], states=["own 0"]), "own 0", "leg 0", "leg 1")
     refused(lambda: problem.link(legs[0], legs[1], states="y"), "y", "leg 0", "leg 1")
     problem.link(legs[0], legs[1], states="x")
     problem.link(legs[1], legs[2], states=())
     assert [link.states for link in problem.compile().links] == [("x",), ()]
-
-
-def test_links_do_not_close_a_circle():
     problem, legs = relay()
     refused(lambda: problem.link(legs[0], legs[0]), "leg 0")
     problem.link(legs[0], legs[1])
@@ -247,9 +232,6 @@ def test_links_do_not_close_a_circle():
     refused(lambda: problem.link(legs[1], legs[0]), "leg 0", "leg 1", "circle")
     problem.link(legs[1], legs[2])
     refused(lambda: problem.link(legs[2], legs[0]), "leg 2", "leg 0", "circle")
-
-
-def test_a_link_stated_before_the_states_still_joins_them():
     problem = Problem("relay")
     first, second = problem.phase("up", t0=0, tf=1), problem.phase("down", t0=1, tf=2)
     problem.link(first, second)
@@ -258,9 +240,6 @@ def test_a_link_stated_before_the_states_still_joins_them():
         phase.dynamics(x=1)
     problem.minimize("time", second.tf)
     assert problem.compile().links[0].states == ("x",)
-
-
-def test_a_jump_of_a_state_that_a_link_continues_is_refused_by_name():
     problem, legs = relay()
     problem.link(legs[0], legs[1])
     problem.constraint("drop", legs[0].final(legs[0]["x"]) - legs[1].initial(legs[1]["x"]), lower=2.0)
@@ -270,9 +249,6 @@ def test_a_jump_of_a_state_that_a_link_continues_is_refused_by_name():
     problem.constraint("drop", legs[0].final(legs[0]["x"]) - legs[1].initial(legs[1]["x"]), lower=2.0)
     problem.constraint("as before", legs[0].final(legs[0]["x"]) - legs[0].final(legs[0]["x"]), upper=0.0)
     problem.compile()
-
-
-def test_links_that_leave_nothing_are_refused():
     problem, legs = relay(2)
     third = problem.phase("late", t0=11, tf=12)
     third.state("x", bounds=(0, 1))
@@ -297,9 +273,6 @@ def test_times_are_narrowed_by_durations():
     assert ranges(glider(tf=(0, 100), duration=(2, 5))[0]) == {"descent": (0, 0, 2, 5)}
     assert ranges(glider(t0=(0, 10), tf=8, duration=3)[0]) == {"descent": (5, 5, 8, 8)}
     assert ranges(glider(t0=(4, 10), tf=(0, 6))[0]) == {"descent": (4, 6, 4, 6)}
-
-
-def test_times_are_narrowed_along_links_both_ways():
     problem, legs = relay()
     for first, second in itertools.pairwise(legs):
         problem.link(first, second)
@@ -313,7 +286,7 @@ def test_times_are_narrowed_along_links_both_ways():
     assert compiled.phases[2].final[0] == (3, 3) and compiled.phases[3].initial[0] == (3, 3)
 
 
-def test_every_state_needs_a_rate_and_nothing_else_has_one():
+def test_a_problem_needs_a_phase_an_objective_and_states_each_with_a_rate():
     _, phase = bare()
     phase.state("height", bounds=(0, 1))
     phase.state("speed", bounds=(0, 1))
@@ -321,9 +294,6 @@ def test_every_state_needs_a_rate_and_nothing_else_has_one():
     refused(lambda: phase.dynamics(height=1, speed=1, mass=1), "descent", "mass")
     phase.dynamics(speed=1, height=2)
     refused(lambda: phase.dynamics(height=1, speed=1), "descent", "twice")
-
-
-def test_every_state_has_a_rate_when_the_problem_is_compiled():
     problem, phase = glider()
     phase.state("speed", bounds=(0, 1))
     refused(problem.compile, "descent", "speed")
@@ -331,9 +301,6 @@ def test_every_state_has_a_rate_when_the_problem_is_compiled():
     phase.state("height", bounds=(0, 1))
     problem.minimize("time", phase.tf)
     refused(problem.compile, "descent", "height")
-
-
-def test_a_problem_needs_a_phase_an_objective_and_states():
     refused(lambda: Problem("empty").compile(), "empty", "phase")
     problem, phase = bare()
     refused(problem.compile, "glider", "objective")
@@ -376,9 +343,6 @@ def test_raw_states_controls_and_time_are_refused_in_objectives_and_constraints(
     for symbol, name in ((phase["height"], "height"), (phase["flap"], "flap"), (phase.time, "time of descent")):
         refused(lambda s=symbol: problem.minimize("cost", phase.tf + s), name, "cost", "final(...)")
         refused(lambda s=symbol: problem.constraint("fuel", s, upper=1), name, "fuel", "final(...)")
-
-
-def test_quantities_are_refused_along_a_phase():
     _, phase = glider()
     for kind in ("initial", "final", "integral", "peak"):
         quantity = getattr(phase, kind)(phase["height"])

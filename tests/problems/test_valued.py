@@ -94,14 +94,8 @@ def test_what_rises_is_bounded_and_what_does_not_is_equal() -> None:
     for slope, lower in ((-1.0, -np.inf), (1.0, 0.0)):
         aim = Aim(lambda J, peaks, slope=slope: slope * J[0])
         assert valued(problem.compile(), aim, box([1.0], [0.0])).problem.limits[0].lower == lower
-
-
-def test_an_objective_that_is_not_used_has_no_parameter() -> None:
     derived = valued(two_wells().compile(), Aim(lambda J, peaks: 2 * J[1]), box([0.0, 0.0], [1.0, 1.0]))
     assert derived.names == ("from right",) and len(derived.further) == 1
-
-
-def test_what_is_kept_is_a_limit() -> None:
     first = Aim(lambda J, peaks: peaks[0], lambda J: [[J[0], 0.0]], name="first")
     derived = valued(two_wells().compile(), Aim(lambda J, peaks: J[1]), box([0.0, 0.0], [1.0, 1.0]), kept=[(first, 0.25)])
     limit = next(limit for limit in derived.problem.limits if limit.name == "value of first")
@@ -131,9 +125,6 @@ def test_peaks_may_be_lowered_only() -> None:
     # What is wrong with the problem itself is no fault of the preference.
     with pytest.raises(ValueError, match=r"objective 'speed'.*peak"):
         valued(with_peak("maximised").compile(), Aim(lambda J, peaks: J[2]), box([1.0, 0.2, 0.0], [3.0, 16.0, 1.0]))
-
-
-def test_absolute_values_may_be_lowered_only() -> None:
     # The integral of an absolute value that may have to rise is no longer written as the least of what bounds it.
     problem = Problem("fuel")
     trip = problem.phase("trip", t0=0, tf=(1, 3))

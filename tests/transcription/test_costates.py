@@ -244,16 +244,7 @@ def test_methods_agree_along_the_whole_way(name):
         assert other == pytest.approx(means[0], abs=0.03 * size)
 
 
-@pytest.mark.parametrize(
-    "word",
-    [
-        "radau:9x3",
-        "lobatto:9x3",
-        "dfet:18x2:bernstein:1",
-        "multiple-shooting:18:linear",
-        "shooting:19:linear",
-    ],
-)
+@pytest.mark.parametrize("word", ["radau:9x3", "lobatto:9x3", "dfet:18x2:bernstein:1", "multiple-shooting:18:linear", "shooting:19:linear"])
 def test_costates_jump_where_a_state_enters_and_leaves_its_limit(word):
     """Below a wall at l = 1/9, u = -2/(3 l) (1 - t/(3 l)) up to 3 l, 0 along the wall, and the mirror image after it (Bryson and Ho, 3.11):
     the costate of v is -u, and that of x, its slope reversed, is 2/(9 l^2) = 18, 0 and -18."""

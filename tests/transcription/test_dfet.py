@@ -80,22 +80,6 @@ def test_violations_name_what_is_violated():
     assert max(found.values()) == nlp.evaluate(Z)[1][0]
     Z[0, slot(nlp, "run.u[0,0]")] = 2
     assert nlp.violations(Z[0])["bounds of run.u"] == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
-def test_integrals_have_their_closed_form(basis):
-    problem, phase = decay(tf=1.5)
-    x, t = phase["x"], phase.time
-    problem.minimize("square", phase.integral(x**2))
-    problem.maximize("moment", phase.integral(t * x))
-    problem.minimize("clock", phase.integral(1))
-    nlp = DFET(3, 6, basis=basis).transcribe(problem)
-    F, _ = nlp.evaluate(nlp.propagate(nlp.first_guess(np.empty((1, 0)))))
-    e = np.exp(-1.5)
-    assert F[0] == pytest.approx([e, (1 - e**2) / 2, -(1 - e * 2.5), 1.5], rel=1e-10)
-
-
-def test_path_constraints_are_imposed_at_ends_and_nodes():
     problem, phase = integrator()
     phase.path("gate", phase["x"] + phase.time, lower=-1, upper=3)
     phase.path("exact", phase["u"] ** 2, lower=1, upper=1)
@@ -109,6 +93,19 @@ def test_path_constraints_are_imposed_at_ends_and_nodes():
     times = nlp.unpack(z)["run"].time
     assert np.unique(values.round(12)) == pytest.approx(2 * times), "x = t here"
     assert nlp.unpack(z)["run"]["gate"] == pytest.approx(2 * times)
+
+
+@pytest.mark.parametrize("basis", ["lobatto", "bernstein"])
+def test_integrals_have_their_closed_form(basis):
+    problem, phase = decay(tf=1.5)
+    x, t = phase["x"], phase.time
+    problem.minimize("square", phase.integral(x**2))
+    problem.maximize("moment", phase.integral(t * x))
+    problem.minimize("clock", phase.integral(1))
+    nlp = DFET(3, 6, basis=basis).transcribe(problem)
+    F, _ = nlp.evaluate(nlp.propagate(nlp.first_guess(np.empty((1, 0)))))
+    e = np.exp(-1.5)
+    assert F[0] == pytest.approx([e, (1 - e**2) / 2, -(1 - e * 2.5), 1.5], rel=1e-10)
 
 
 @pytest.mark.parametrize("kind", ["linear", "bspline"])

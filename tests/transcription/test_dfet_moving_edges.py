@@ -30,6 +30,14 @@ def test_moving_edges_are_free_variables_that_cannot_meet():
     close = PhaseMesh((0.0, 0.2, 0.4, 1.0), 1, None, (1, 2)).ranges()
     assert close == pytest.approx(np.array([[0.02, 0.29], [0.31, 0.94]]))
     assert nlp.guess[names.index("swing.edge[3]")] == 0.6
+    mesh = PhaseMesh(EDGES, 3, None, MOVING)
+    own = np.array([0.0, 0.2, 0.35, 0.5, 1.0])
+    assert mesh.found_in(3.0 + 2.0 * own).edges == pytest.approx(own, abs=1e-12)
+    assert mesh.found_in(own).ranges() != pytest.approx(mesh.ranges())
+    other, beyond = own.copy(), own.copy()
+    other[2], beyond[[2, 3]] = 0.4, (0.585, 0.97)
+    for edges in (other, beyond, own[[0, 1, 3, 4]], 0.0 * own):
+        assert mesh.found_in(edges) is mesh
 
 
 @pytest.mark.slow
@@ -66,17 +74,6 @@ def test_a_trajectory_comes_back_from_its_own_mesh_with_its_edges(basis):
     nlp = moving(basis).transcribe(oscillator())
     for z in propagated(nlp):
         assert np.abs((nlp.interpolate(nlp.unpack(z)) - z) / nlp.span).max() < 1e-9
-
-
-def test_a_mesh_is_found_in_trajectories_of_its_own_only():
-    mesh = PhaseMesh(EDGES, 3, None, MOVING)
-    own = np.array([0.0, 0.2, 0.35, 0.5, 1.0])
-    assert mesh.found_in(3.0 + 2.0 * own).edges == pytest.approx(own, abs=1e-12)
-    assert mesh.found_in(own).ranges() != pytest.approx(mesh.ranges())
-    other, beyond = own.copy(), own.copy()
-    other[2], beyond[[2, 3]] = 0.4, (0.585, 0.97)
-    for edges in (other, beyond, own[[0, 1, 3, 4]], 0.0 * own):
-        assert mesh.found_in(edges) is mesh
 
 
 def least_time() -> Problem:

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -169,8 +170,6 @@ print(found.z.tobytes().hex())
 
 @pytest.mark.slow
 def test_two_processes_give_the_same_bits():
-    from pathlib import Path
-
     code = SCRIPT.format(here=str(Path(__file__).parent))
     first, second = (subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout for _ in range(2))
     assert first == second and len(first) > 100
@@ -240,16 +239,13 @@ def test_each_candidate_takes_the_same_work_and_one_iteration(inner: str, one: A
         assert found.iterations.tolist() == [1] * k and found.iterations.dtype.kind == "i" and found.fallbacks == 0
 
 
-def test_a_propagation_that_fails_gives_the_warm_start_back() -> None:
+def test_warm_starts_of_propagation_and_of_no_level_and_names_of_levels() -> None:
     nlp = DFET(2, 2).transcribe(broken())
     C, warm = candidates(nlp, 3), np.full((3, len(nlp.variables)), 0.25)
     found = Propagate().solve(nlp, C, warm)
     assert set(found.status) == {"failed"} and np.array_equal(found.z[:, nlp.free], C)
     assert (np.delete(found.z, nlp.free, axis=1) == 0.25).all()
-
-
-def test_without_an_inner_level_the_states_of_a_warm_start_are_judged_as_they_are() -> None:
-    """x' = u = 0.5 reaches 1 in 2: with the states of that flight it is feasible, with the guessed ones of 0 everywhere it is not."""
+    # x' = u = 0.5 reaches 1 in 2: with the states of that flight it is feasible, with the guessed ones of 0 everywhere it is not.
     nlp = hop_nlp()
     C = np.full((1, len(nlp.free)), 0.5)
     flown = nlp.propagate(nlp.guessed(C))
@@ -258,9 +254,6 @@ def test_without_an_inner_level_the_states_of_a_warm_start_are_judged_as_they_ar
     still = flown.copy()
     still[:, np.setdiff1d(np.arange(len(nlp.variables)), nlp.free)] = 0.0
     assert Whole().solve(nlp, C, still).status.tolist() == ["infeasible"]
-
-
-def test_levels_are_found_by_their_names_alone() -> None:
     for name, level in levels.NAMED.items():
         assert inner_solver(name) is level and inner_solver(level) is level
     for wrong in ("newton", "", None, 3, Propagate, ["auto"]):

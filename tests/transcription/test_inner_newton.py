@@ -46,11 +46,7 @@ def two_phases():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("problem", "mesh"),
-    [
-        (load("goddard"), DFET(3, 3, control_order=4, basis="bernstein")),
-        (two_phases(), DFET(3, 2)),
-        (two_phases(), Euler(6)),
-    ],
+    [(load("goddard"), DFET(3, 3, control_order=4, basis="bernstein")), (two_phases(), DFET(3, 2)), (two_phases(), Euler(6))],
     ids=["bernstein", "two phases", "default derivatives"],
 )
 def test_total_derivatives_are_those_of_differences(problem, mesh):

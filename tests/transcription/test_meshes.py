@@ -76,38 +76,34 @@ def test_meshes_stay_meshes_and_lose_nothing(mesh, room):
         assert len(finer) > len(edges) or raised > order, "somewhere there is always more to do"
 
 
-def test_only_where_the_error_is_large_are_elements_cut():
+def test_where_elements_are_cut_merged_or_get_a_higher_order():
     finer, order = refine(EDGES, 4, np.array([5.0, 0.2, 0.1]), np.zeros(3), NONE, most=20, highest=HIGHEST)
     assert finer.tolist() == [0.0, 0.1, 0.2, 0.5, 1.0] and order == 4
-
-
-def test_smooth_elements_get_a_higher_order():
     finer, order = refine(EDGES, 4, np.array([50.0, 0.2, 0.1]), np.full(3, 2.0), NONE, most=20, highest=HIGHEST)
     assert finer.tolist() == EDGES.tolist() and order == 5
     finer, _ = refine(EDGES, HIGHEST, np.array([50.0, 0.2, 0.1]), np.full(3, 2.0), NONE, most=20, highest=HIGHEST)
     assert finer.tolist() == [0.0, 0.1, 0.2, 0.5, 1.0]
-
-
-def test_what_a_higher_order_would_not_mend_is_cut():
     finer, order = refine(EDGES, 6, np.array([1e9, 0.2, 0.1]), np.full(3, 0.9), NONE, most=20, highest=HIGHEST)
     assert order == 6 and finer.tolist() == [0.0, 0.05, 0.1, pytest.approx(0.15), 0.2, 0.5, 1.0], "as many parts as the error asks for"
-
-
-def test_an_element_is_cut_around_a_steep_place():
     finer, order = refine(EDGES, 4, np.array([0.1, 0.1, 9.0]), np.full(3, 3.0), np.array([np.nan, np.nan, 0.2]), most=20, highest=HIGHEST)
     assert finer == pytest.approx([0, 0.2, 0.5, 0.725, 0.875, 1.0]) and order == 4
     assert cuts(0.95) == [pytest.approx(0.7)] and cuts(-0.95) == [pytest.approx(-0.7)] and cuts(np.nan) == [0.0]
     assert cuts(0.95, graded=True) == pytest.approx([0.7, 0.94, 0.988]), "an element at the end, however thin the layer is"
     assert cuts(0.2, graded=True) == pytest.approx(sorted([0.2 + s * d for s in (-1, 1) for d in LAYERS]))
-
-
-def test_the_worst_elements_come_first_where_there_is_little_room():
     finer, _ = refine(EDGES, 4, np.array([5.0, 50.0, 6.0]), np.zeros(3), NONE, most=4, highest=HIGHEST)
     assert finer.tolist() == [0.0, 0.2, 0.35, 0.5, 1.0]
     assert split(EDGES, {0: [0.0]}, most=3) is EDGES
+    edges, kept = np.linspace(0, 1, 7), np.zeros(7, dtype=bool)
+    good, bad = np.full(6, 1e-9), np.array([1.0, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9])
+    assert merged(edges, 4, good, kept).tolist() == [True, False, True, False, True, False, True]
+    assert merged(edges, 4, bad, kept).tolist() == [True, True, False, True, False, True, True]
+    kept[1] = True
+    assert merged(edges, 4, good, kept).tolist() == [True, True, False, True, False, True, True]
+    assert merged(np.array([0.0, 0.01, 1.0]), 4, good[:2], kept[:3]).all(), "elements of very different lengths stay apart"
+    assert merged(edges, 4, np.full(6, 1e-2), kept).all()
 
 
-def test_decay_rates_are_those_of_the_function():
+def test_decay_rates_scales_curvatures_and_densities_of_nothing():
     tau = gauss_legendre(9)[0]
 
     def rate(f):
@@ -117,6 +113,20 @@ def test_decay_rates_are_those_of_the_function():
     assert rate(lambda t: 1 / (1.5 - t)) == pytest.approx(np.log(1.5 + np.sqrt(1.25)), abs=0.2)
     assert rate(np.abs) < 0.5 and rate(np.sign) < 0.3
     assert rate(lambda t: 2.0 + 0 * t) == np.inf
+    low, high, span = np.array([0.0, 5.0, -1e-9, 0.0, -3.0]), np.array([2.0, 5.0, 1e-9, 9.0, 4.0]), np.array([1e4, 1e4, 10.0, 3.0, 7.0])
+    assert own_scales(low, high, span) == pytest.approx([2.0, 1e-2, 1e-5, 3.0, 7.0])
+    places = np.sort(np.random.default_rng(0).uniform(-1, 1, 40))
+    parabola = curvatures(places, np.stack([places**2, 3.0 - 2.0 * places], axis=-1))
+    assert parabola[1:-1, 0] == pytest.approx(2.0 / (1.0 + 4.0 * places[1:-1] ** 2) ** 1.5, rel=1e-9), "exact by parabolas"
+    assert parabola[:, 1] == pytest.approx(0.0, abs=1e-9)
+    places = np.linspace(-0.8, 0.8, 400)
+    assert curvatures(places, 0.5 * np.sqrt(4.0 - 4.0 * places**2)[:, None]) == pytest.approx(1.0, rel=1e-3)
+    assert curvature_density(np.array([[8.0, 27.0], [0.0, 1.0]]), np.array([2.0, 1.0])) == pytest.approx([5.0, 1.0])
+    places = np.array([0.0, 0.3, 1.0])
+    assert (normalised(places, np.zeros((2, 2))) == 1.0).all()
+    for values in (np.zeros((2, 2)), np.array([[1.0, -2.0], [5.0, 5.0]]), np.array([[1.0, np.nan], [5.0, 5.0]])):
+        with pytest.raises(ValueError, match="a density must be finite and nowhere negative, and its integral positive"):
+            equidistributed(places, values, 3)
 
 
 def test_quadrature_is_held_against_the_flight():
@@ -159,11 +169,6 @@ def test_trajectories_become_as_exact_as_wanted(method):
     assert simulate(nlp.problem, nlp.unpack(z), rtol=1e-11, atol=1e-12).max_defect < 1e-6
 
 
-def test_scales_are_what_a_quantity_does_not_its_bounds():
-    low, high, span = np.array([0.0, 5.0, -1e-9, 0.0, -3.0]), np.array([2.0, 5.0, 1e-9, 9.0, 4.0]), np.array([1e4, 1e4, 10.0, 3.0, 7.0])
-    assert own_scales(low, high, span) == pytest.approx([2.0, 1e-2, 1e-5, 3.0, 7.0])
-
-
 def test_errors_do_not_depend_on_the_width_of_bounds():
     values, found = np.sin(np.arange(9)), []
     for wide in (1e3, 1.0):
@@ -184,17 +189,6 @@ def test_errors_do_not_depend_on_the_width_of_bounds():
 
 
 # Orders of controls, and elements that become one
-
-
-def test_elements_are_merged_only_where_both_are_far_better_than_they_need_to_be():
-    edges, kept = np.linspace(0, 1, 7), np.zeros(7, dtype=bool)
-    good, bad = np.full(6, 1e-9), np.array([1.0, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9])
-    assert merged(edges, 4, good, kept).tolist() == [True, False, True, False, True, False, True]
-    assert merged(edges, 4, bad, kept).tolist() == [True, True, False, True, False, True, True]
-    kept[1] = True
-    assert merged(edges, 4, good, kept).tolist() == [True, True, False, True, False, True, True]
-    assert merged(np.array([0.0, 0.01, 1.0]), 4, good[:2], kept[:3]).all(), "elements of very different lengths stay apart"
-    assert merged(edges, 4, np.full(6, 1e-2), kept).all()
 
 
 @pytest.mark.slow
@@ -286,24 +280,6 @@ def test_a_floor_bounds_the_longest_interval(density, count, least):
     assert np.diff(equidistributed(places, found, count)).max() <= 1.0 / (least * count) + 1e-12
     if least == 1.0:
         assert equidistributed(places, found, count) == pytest.approx(np.linspace(0, 1, count + 1), abs=1e-12)
-
-
-def test_nothing_but_zeros_is_even_and_no_density_at_all_is_refused():
-    places = np.array([0.0, 0.3, 1.0])
-    assert (normalised(places, np.zeros((2, 2))) == 1.0).all()
-    for values in (np.zeros((2, 2)), np.array([[1.0, -2.0], [5.0, 5.0]]), np.array([[1.0, np.nan], [5.0, 5.0]])):
-        with pytest.raises(ValueError, match="a density must be finite and nowhere negative, and its integral positive"):
-            equidistributed(places, values, 3)
-
-
-def test_the_curvature_of_a_parabola_and_of_a_circle():
-    places = np.sort(np.random.default_rng(0).uniform(-1, 1, 40))
-    parabola = curvatures(places, np.stack([places**2, 3.0 - 2.0 * places], axis=-1))
-    assert parabola[1:-1, 0] == pytest.approx(2.0 / (1.0 + 4.0 * places[1:-1] ** 2) ** 1.5, rel=1e-9), "exact by parabolas"
-    assert parabola[:, 1] == pytest.approx(0.0, abs=1e-9)
-    places = np.linspace(-0.8, 0.8, 400)
-    assert curvatures(places, 0.5 * np.sqrt(4.0 - 4.0 * places**2)[:, None]) == pytest.approx(1.0, rel=1e-3)
-    assert curvature_density(np.array([[8.0, 27.0], [0.0, 1.0]]), np.array([2.0, 1.0])) == pytest.approx([5.0, 1.0])
 
 
 def some_trajectory() -> Trajectory:

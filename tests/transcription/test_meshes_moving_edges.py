@@ -95,12 +95,9 @@ def test_sharp_switches_are_found_where_they_are(places, n, first):
     assert described(found)[0] == ((UPPER, LOWER) if first else (LOWER, UPPER))
 
 
-def test_a_switch_where_two_elements_meet():
+def test_switches_between_elements_humps_arcs_and_jumps():
     (found,) = switches(*sampled([0, 0.3, 1], [[1, 1], [0, 0]]))
     assert (found.place, found.before, found.after, found.certainty) == (0.3, UPPER, LOWER, 1.0)
-
-
-def test_a_hump_is_a_pulse_of_the_same_integral_about_its_middle():
     edges = np.linspace(0, 1, 6)
     rows = [[0, 0, 0], [0, 0, 0], [0, 0, 0.9], [0.9, 0, 0], [0, 0, 0]]
     found = switches(*sampled(edges, rows))
@@ -111,9 +108,6 @@ def test_a_hump_is_a_pulse_of_the_same_integral_about_its_middle():
     dip = switches(*sampled(edges, 1.0 - np.array(rows)))
     assert described(dip) == [(UPPER, LOWER), (LOWER, UPPER)]
     assert [one.place for one in dip] == pytest.approx([one.place for one in found], abs=0.2 / 64)
-
-
-def test_an_arc_inside_the_bounds_begins_and_ends():
     edges = np.linspace(0, 1, 11)
     rows = [[1, 1, 1], *([0.3, 0.25, 0.3], [0.35, 0.2, 0.35]) * 3, [0, 0, 0], [0, 0, 0], [0, 0, 0]]
     found = switches(*sampled(edges, rows))
@@ -123,9 +117,6 @@ def test_an_arc_inside_the_bounds_begins_and_ends():
     rows[3] = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3]
     rows = [row if len(row) == 7 else [*row] for row in rows]
     assert described(switches(*sampled(edges, rows))) == [(UPPER, INSIDE), (INSIDE, LOWER)]
-
-
-def test_a_smooth_control_has_none_and_one_that_jumps_inside_has_one():
     edges = np.linspace(0, 1, 5)
     assert not switches(*sampled(edges, [[0.1, 0.3], [0.3, 0.5], [0.5, 0.6], [0.6, 0.9]]))
     found = switches(*sampled(edges, [[0.1, 0.15], [0.15, 0.2], [0.8, 0.75], [0.75, 0.7]]))
@@ -367,9 +358,6 @@ def test_an_edge_that_can_go_no_further_begins_anew():
     problem, method, flight = flown((0, 0.25, 0.5, 0.75, 1), (2,), [full, full, [3.0, 1.5, 0.0], off], [0.5])
     (found,) = phase_switches(flight["fall"])["u"]
     assert found.place == pytest.approx(0.625, abs=0.01) and switched(method, problem, flight) is None
-
-
-def test_edges_begin_at_the_switches_that_they_have_left():
     off, full, falling = [0.0, 0.0, 0.0], [3.0, 3.0, 3.0], [3.0, 1.5, 0.0]
     _, method, flight = flown((0, 0.25, 0.5, 0.75, 1), (2,), [full, full, falling, off], [0.5])
     (found,) = phase_switches(flight["fall"])["u"]
@@ -378,6 +366,12 @@ def test_edges_begin_at_the_switches_that_they_have_left():
     # At its switch an edge stays exactly.
     _, method, flight = flown((0, 0.5, 1), (1,), [off, full], [0.8], {"u": (0, 1)})
     assert at_switches(method, flight) == method.settled(flight) != method
+    mesh = PhaseMesh((0, 0.3, 0.6, 1), 3, 1, (2,))
+    assert mesh.with_elements((0, 0.1, 0.3, 0.5, 0.6, 1), 4, None) == PhaseMesh((0, 0.1, 0.3, 0.5, 0.6, 1), 4, None, (4,))
+    held = PhaseMesh((0, 0.3, 0.6, 1), 3, 1, (2,), {"u": (1,)})
+    assert held.with_elements((0, 0.3, 0.6, 0.8, 1), 3, 2) == PhaseMesh((0, 0.3, 0.6, 0.8, 1), 3, 2, (2,), {"u": (1,)})
+    with pytest.raises(ValueError, match="has to stay"):
+        mesh.with_elements((0, 0.3, 0.61, 1), 4, None)
 
 
 @pytest.mark.slow
@@ -390,12 +384,3 @@ def test_on_finer_meshes_edges_are_where_controls_switch():
     edges = phase.state.edges / phase.tf
     assert len(mesh.moving) == len(places) == 2 and point.objectives["range"] == pytest.approx(1248.031, abs=1e-3)
     assert edges[list(mesh.moving)] == pytest.approx(places, abs=0.05 / mesh.elements)
-
-
-def test_moving_edges_stay_when_elements_are_cut():
-    mesh = PhaseMesh((0, 0.3, 0.6, 1), 3, 1, (2,))
-    assert mesh.with_elements((0, 0.1, 0.3, 0.5, 0.6, 1), 4, None) == PhaseMesh((0, 0.1, 0.3, 0.5, 0.6, 1), 4, None, (4,))
-    held = PhaseMesh((0, 0.3, 0.6, 1), 3, 1, (2,), {"u": (1,)})
-    assert held.with_elements((0, 0.3, 0.6, 0.8, 1), 3, 2) == PhaseMesh((0, 0.3, 0.6, 0.8, 1), 3, 2, (2,), {"u": (1,)})
-    with pytest.raises(ValueError, match="has to stay"):
-        mesh.with_elements((0, 0.3, 0.61, 1), 4, None)

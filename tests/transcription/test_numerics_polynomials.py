@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from scipy.interpolate import BPoly
 
+from transcription import PiecewisePolynomial
 from transcription.numerics import polynomials as pl
 
 LEAST = {"lobatto": 0, "legendre": 0, "closed-legendre": 2, "radau": 0, "closed-radau": 1, "chebyshev": 0, "bernstein": 0}
@@ -74,8 +75,6 @@ def test_unknown_bases_are_refused():
 @settings(max_examples=30)
 @given(bases, st.integers(1, 5), st.integers(0, 2**32 - 1), st.floats(0, 1))
 def test_piecewise_polynomials_agree_with_their_elements(which, elements, seed, share):
-    from transcription import PiecewisePolynomial
-
     rng = np.random.default_rng(seed)
     edges = np.cumsum(rng.uniform(0.1, 2, elements + 1)) - 3
     pieces = PiecewisePolynomial(edges, rng.normal(size=(elements, which[1] + 1, 2)), which[0])

@@ -26,6 +26,11 @@ def test_hypercubes_by_hand() -> None:
     assert len(set(cube)) == 4
     assert hypercubes(np.ones((3, 2)), 30).tolist() == [0, 0, 0]
     assert len(set(hypercubes(np.stack([np.arange(30.0), np.ones(30)], axis=1), 30))) == 30
+    best = np.array([[1.0, 1.0]] * 4)
+    F = np.array([[0.5, 1.0], [1.0, 1.5], [0.5, 1.5], [0.5, 1.5]])
+    assert improved(F, best, np.array([False, True, True, False])).tolist() == [True, False, True, False]
+    common = {"particles": 20, "archive": 100, "inertia": 1.4, "final_inertia": 0.4, "cognitive": 2, "social": 2}
+    assert MOPSO.paper(cells=10) == MOPSO(**common, cells=10, one_leader=True, settled=0.01)
 
 
 @given(arrays(float, st.tuples(st.integers(1, 40), st.integers(1, 4)), elements=st.floats(-1e6, 1e6)), st.integers(1, 30))
@@ -43,9 +48,6 @@ def test_the_roulette_prefers_thin_hypercubes() -> None:
     share = np.bincount(rows, minlength=6) / 60_000
     wheel = 1 / 3 + 1 + 1 / 2
     assert share == pytest.approx(np.array([1 / 9, 1 / 9, 1 / 9, 1, 1 / 4, 1 / 4]) / wheel, abs=0.01)
-
-
-def test_the_fullest_hypercubes_are_thinned_out() -> None:
     cube = np.array([0, 1, 0, 1, 0, 2, 0, 2, 3])
     keep = thin_out(cube, 5, np.random.default_rng(1))
     assert sorted(np.bincount(cube[keep], minlength=4)) in ([1, 1, 1, 2],)
@@ -82,9 +84,8 @@ def test_bounds_stop_and_turn_particles_and_periods_let_them_through() -> None:
     there, speed = moved(ROUND, X, V, rebound)
     assert there == pytest.approx(np.array([[0.2, 1], [0.8, 0]]))
     assert speed == pytest.approx(np.array([[0.3, -0.075], [-0.3, 0.075]]))
-    V = velocities(
-        ROUND, X[:1], 0 * V[:1], X[1:], X[1:], weights=(0, 1, 0), chance=np.ones((2, 1, 2)), largest=1.0
-    )  # to 0.1 from 0.9: forward where it is periodic
+    # To 0.1 from 0.9: forward where it is periodic.
+    V = velocities(ROUND, X[:1], 0 * V[:1], X[1:], X[1:], weights=(0, 1, 0), chance=np.ones((2, 1, 2)), largest=1.0)
     assert pytest.approx(V) == np.array([[0.2, -0.8]])
 
 
@@ -94,12 +95,6 @@ def test_particles_stay_in_the_box(X, V, seed) -> None:
         there, speed = moved(box, X, V, -np.random.default_rng(seed).random((6, 2)))
         assert ((there >= 0) & (there <= 1)).all()
         assert (np.abs(speed) <= np.abs(V)).all()
-
-
-def test_the_best_place_of_a_particle() -> None:
-    best = np.array([[1.0, 1.0]] * 4)
-    F = np.array([[0.5, 1.0], [1.0, 1.5], [0.5, 1.5], [0.5, 1.5]])
-    assert improved(F, best, np.array([False, True, True, False])).tolist() == [True, False, True, False]
 
 
 def schaffer(X: np.ndarray) -> np.ndarray:
@@ -173,11 +168,6 @@ def test_zdt(kind) -> None:
     front = MOPSO().minimize(function, bounds, evaluations=10_000, seed=1)
     assert igd(front.F, ref=truth) < 0.1
     assert 50 <= len(front) <= 100
-
-
-def test_the_paper_s_settings() -> None:
-    common = {"particles": 20, "archive": 100, "inertia": 1.4, "final_inertia": 0.4, "cognitive": 2, "social": 2}
-    assert MOPSO.paper(cells=10) == MOPSO(**common, cells=10, one_leader=True, settled=0.01)
 
 
 @pytest.mark.slow

@@ -96,9 +96,6 @@ def test_the_number_of_objectives_may_not_contradict_the_names():
     assert box.m == 3
     with pytest.raises(ValueError, match="returned 2, 3 expected"):
         box.evaluate(middle(box))
-
-
-def test_the_number_of_objectives_comes_from_the_first_batch_and_asking_before_is_counted():
     box = boxed(two, [(0, 1)])
     box.evaluate(middle(box))
     assert (box.m, box.counts.evaluations) == (2, 3)
@@ -121,8 +118,6 @@ def test_failed_rows_constraints_and_senses():
     assert result.F[0].tolist() == [0.0, -1.0]
     assert box.counts.failures == {"failed": 1, "infeasible": 1}
 
-
-def test_violations_of_a_function_are_its_columns():
     def function(X):
         return X, np.stack([X[:, 0] - 1, 1 - X[:, 0]], axis=1)
 
@@ -130,8 +125,6 @@ def test_violations_of_a_function_are_its_columns():
     assert seen.violations.tolist() == [[2, 0, 0], [0, 0.5, 2]] and seen.violation.tolist() == [2, 2]
     assert boxed(lambda X: X, [(0, 1)] * 2).evaluate(np.zeros((3, 2))).violations.shape == (3, 0)
 
-
-def test_one_objective_may_come_as_a_vector_and_the_function_may_not_change_its_points():
     def function(X):
         X *= 2
         return X.sum(axis=1)

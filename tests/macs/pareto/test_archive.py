@@ -50,6 +50,13 @@ def test_nothing_infeasible_failed_or_equal_comes_in():
     assert len(offer(archive, [[np.nan, 0.0]], violation=[np.inf])) == 1
     assert offer(archive, [[1.0, 2.0]]).F.tolist() == [[1.0, 2.0]]
     assert offer(archive, [[1.0, 1.0]]).F.tolist() == [[1.0, 1.0]]
+    archive = offer(empty(1), [[3.0], [1.0], [2.0]])
+    assert archive.F.tolist() == [[1.0]]
+    assert offer(archive, [[0.5], [4.0]]).F.tolist() == [[0.5]]
+    archive = offer(empty(2), quarter_circle(40)[5:35], limit=5)
+    archive = offer(archive, [[-0.5, 3.0]], limit=5)
+    assert len(archive) == 5
+    assert archive.F.min(axis=0)[0] == -0.5
 
 
 @given(st.integers(2, 4), st.integers(4, 12), st.integers(0, 2**32 - 1), st.booleans())
@@ -68,17 +75,22 @@ def test_extremes_are_chosen_and_energy_never_rises_unless_they_were_missing(m, 
         assert energy(F, chosen) <= energy(F, members) * (1 + 1e-9)
 
 
-def test_a_missing_extreme_is_added_at_any_cost():
+def test_a_missing_extreme_is_added_at_any_cost_and_distances_are_in_ranges_by_factors():
     F = np.array([[0.0, 0.01, 1.0], [0.01, 0.0, 0.9], [1.0, 1.0, 0.0], [0.3, 0.5, 0.5]])
     members = np.array([True, False, True, True])
     chosen = spread(F, 3, members)
     assert chosen.tolist() == [True, True, True, False]
     assert energy(F, chosen) > energy(F, members)
-
-
-def test_fewer_than_the_objectives_are_the_best_of_the_first_of_them():
     F = np.array([[3.0, 2.0, 2.0], [2.0, 2.0, 1.0], [1.0, 3.0, 3.0], [2.0, 1.0, 3.0]])
     assert spread(F, 2).tolist() == [False, False, True, True]
+    F = np.stack([np.linspace(0, 1, 5), np.linspace(1, 0, 5), np.full(5, 7.0)], axis=1)
+    assert np.array_equal(pair_energies(F), pair_energies(F[:, :2]))
+    assert np.isfinite(pair_energies(np.ones((3, 2)))).all()
+    F = quarter_circle(5)
+    plain, stretched = pair_energies(F, 2.0), pair_energies(F, 2.0, factors=np.array([1.0, 4.0, 1.0, 9.0, 1.0]))
+    assert stretched[0, 1] == pytest.approx(plain[0, 1] / 4.0)
+    assert stretched[1, 3] == pytest.approx(plain[1, 3] / 36.0)
+    assert stretched[0, 2] == pytest.approx(plain[0, 2])
 
 
 def test_the_archive_spreads_evenly_and_keeps_the_ends():
@@ -89,25 +101,6 @@ def test_the_archive_spreads_evenly_and_keeps_the_ends():
     gaps = np.linalg.norm(np.diff(archive.F[np.argsort(archive.F[:, 0])], axis=0), axis=1)
     assert archive.F.min(axis=0).tolist() == [0.0, 0.0]
     assert gaps.max() / gaps.min() < 1.25
-
-
-def test_a_new_extreme_makes_room_for_itself():
-    archive = offer(empty(2), quarter_circle(40)[5:35], limit=5)
-    archive = offer(archive, [[-0.5, 3.0]], limit=5)
-    assert len(archive) == 5
-    assert archive.F.min(axis=0)[0] == -0.5
-
-
-def test_an_objective_without_range_adds_no_distance():
-    F = np.stack([np.linspace(0, 1, 5), np.linspace(1, 0, 5), np.full(5, 7.0)], axis=1)
-    assert np.array_equal(pair_energies(F), pair_energies(F[:, :2]))
-    assert np.isfinite(pair_energies(np.ones((3, 2)))).all()
-
-
-def test_one_objective_keeps_the_best():
-    archive = offer(empty(1), [[3.0], [1.0], [2.0]])
-    assert archive.F.tolist() == [[1.0]]
-    assert offer(archive, [[0.5], [4.0]]).F.tolist() == [[0.5]]
 
 
 @pytest.mark.parametrize("scale", [1e-4, 1.0])
@@ -169,14 +162,6 @@ def test_the_exponent_is_two_for_curves_and_eight_for_surfaces_unless_it_is_give
     F[:, varying:] = 1.0
     assert reach(F, None) == exponent and reach(F, 5.0) == 5.0
     assert np.array_equal(pair_energies(F), pair_energies(F, exponent))
-
-
-def test_factors_stretch_distances_by_their_geometric_mean():
-    F = quarter_circle(5)
-    plain, stretched = pair_energies(F, 2.0), pair_energies(F, 2.0, factors=np.array([1.0, 4.0, 1.0, 9.0, 1.0]))
-    assert stretched[0, 1] == pytest.approx(plain[0, 1] / 4.0)
-    assert stretched[1, 3] == pytest.approx(plain[1, 3] / 36.0)
-    assert stretched[0, 2] == pytest.approx(plain[0, 2])
 
 
 def test_points_outside_are_infeasible_and_neither_dominated_by_the_archive_nor_among_themselves():
@@ -261,9 +246,6 @@ def test_columns_stay_together():
     mixed = one.replaced(np.array([False, True]), two)
     assert mixed.Z.ravel().tolist() == [1, 4] and mixed.F.tolist() == [[1, 4], [6, -1]] and mixed.violation.tolist() == [0, 0.25]
     assert repr(one) == "<Archive: 2 points, 2 objectives>" and repr(one.take(np.array([0]))) == "<Archive: 1 point, 2 objectives>"
-
-
-def test_points_of_the_old_archive_come_first_and_all_columns_of_the_new_ones_are_kept():
     archive = offer(empty(2), [[1.0, 2.0]])
     found = insert(archive, np.array([[7.0], [8.0]]), np.array([[0.0, 3.0], [2.0, 2.5]]), np.array([1e-7, 0.0]), limit=10, tolerance=1e-6)
     assert found.F.tolist() == [[1.0, 2.0], [0.0, 3.0]] and found.Z.ravel().tolist() == [0.0, 7.0]

@@ -32,12 +32,6 @@ def test_directions_are_unit_nonnegative_different_and_begin_with_the_orthogonal
     assert len(directions) <= max(size, m) + 1
 
 
-def test_two_objectives_have_equal_angles():
-    directions = pool(2, 9)
-    angles = np.sort(np.arctan2(directions[:, 0], directions[:, 1]))
-    assert np.allclose(np.diff(angles), np.pi / 2 / 8)
-
-
 @given(st.integers(2, 5), st.integers(1, 6))
 def test_lattice_is_whole_and_sums_to_one(m, divisions):
     lattice = simplex_lattice(m, divisions)
@@ -66,18 +60,6 @@ def test_no_direction_is_drawn_twice_before_all_are_taken(m, count, seed):
     assert len(set(rows.tolist())) == min(count, len(directions))
 
 
-def test_scalarisation_is_safe_where_an_objective_has_no_range():
-    F = np.array([[1.0, 3.0], [2.0, 3.0]])
-    values = tchebycheff(F, np.full(2, 2**-0.5), np.array([1.0, 3.0]), np.array([2.0, 3.0]))
-    assert values.tolist() == pytest.approx([0.0, 2**-0.5])
-    assert np.array_equal(normalised(F, np.array([1.0, 3.0]), np.array([2.0, 3.0])), [[0.0, 0.0], [1.0, 0.0]])
-
-
-def test_a_new_best_objective_is_better_for_the_direction_that_owns_it():
-    ideal, nadir = np.zeros(2), np.ones(2)
-    assert tchebycheff(np.array([-0.1, 5.0]), np.array([1.0, 0.0]), ideal, nadir) < tchebycheff(ideal, np.array([1.0, 0.0]), ideal, nadir)
-
-
 @given(st.integers(1, 4), st.integers(0, 2**32 - 1))
 def test_scalarisation_never_prefers_a_dominated_point(m, seed):
     rng = np.random.default_rng(seed)
@@ -94,6 +76,12 @@ def test_scalarisation_is_the_largest_weighted_objective_and_no_sum():
     assert tchebycheff(F, np.array([0.2, 0.8]), ideal, nadir) == pytest.approx(0.2)
     assert tchebycheff(F, np.array([0.0, 1.0]), ideal, nadir) == pytest.approx(0.25)
     assert tchebycheff(-F, np.array([0.0, 1.0]), -F, nadir) == pytest.approx(0.0)
+    F = np.array([[1.0, 3.0], [2.0, 3.0]])
+    values = tchebycheff(F, np.full(2, 2**-0.5), np.array([1.0, 3.0]), np.array([2.0, 3.0]))
+    assert values.tolist() == pytest.approx([0.0, 2**-0.5])
+    assert np.array_equal(normalised(F, np.array([1.0, 3.0]), np.array([2.0, 3.0])), [[0.0, 0.0], [1.0, 0.0]])
+    ideal, nadir = np.zeros(2), np.ones(2)
+    assert tchebycheff(np.array([-0.1, 5.0]), np.array([1.0, 0.0]), ideal, nadir) < tchebycheff(ideal, np.array([1.0, 0.0]), ideal, nadir)
 
 
 @pytest.mark.parametrize("rows", [0.1, 0.5, 0.9])
@@ -133,16 +121,23 @@ def test_a_direction_with_a_larger_share_is_drawn_more_often():
     assert sorted(draw(directions, 12, rng, shares)) == list(range(12))
 
 
-def test_across_the_diagonal_only_differences_are_left():
-    found = across(np.array([[1.0, 2.0, 6.0], [5.0, 5.0, 5.0]]))
-    assert found.tolist() == [[-2.0, -1.0, 3.0], [0.0, 0.0, 0.0]]
-
-
-def test_sizes_of_lattices_as_tabulated():
+def test_sizes_of_lattices_as_tabulated_and_of_populations_equal_angles_and_cheapest_pairs():
     """Das and Dennis (1998): 91 points of three objectives with 12 divisions, 210 of five with 6."""
     assert [lattice_size(3, divisions) for divisions in (1, 2, 3, 12)] == [3, 6, 10, 91] and lattice_size(5, 6) == 210
     assert [divisions_below(3, count) for count in (1, 3, 5, 6, 9, 91, 104, 105)] == [1, 1, 1, 2, 2, 12, 12, 13]
     assert divisions_below(2, 100) == 99 and divisions_below(5, 210) == 6
+    assert population_size(None, 7, None) == population_size(3, 7, 4) == 7
+    assert population_size(None, None, None) is population_size(None, None, 4) is None
+    found = across(np.array([[1.0, 2.0, 6.0], [5.0, 5.0, 5.0]]))
+    assert found.tolist() == [[-2.0, -1.0, 3.0], [0.0, 0.0, 0.0]]
+    directions = pool(2, 9)
+    angles = np.sort(np.arctan2(directions[:, 0], directions[:, 1]))
+    assert np.allclose(np.diff(angles), np.pi / 2 / 8)
+    costs = np.array([[3.0, 2.0, 9.0], [1.0, 4.0, 9.0]])
+    rows, columns = pair_up(costs)
+    assert rows.tolist() == [1, 0] and columns.tolist() == [0, 1]
+    assert costs.tolist() == [[3.0, 2.0, 9.0], [1.0, 4.0, 9.0]]
+    assert [len(side) for side in pair_up(np.empty((0, 3)))] == [0, 0]
 
 
 SIZES = [(2, None, None, 100), (3, None, None, 91), (3, None, 4, 15), (3, 15, None, 15)]
@@ -167,11 +162,6 @@ def test_other_numbers_of_reference_directions_are_chosen_from_a_finer_lattice(m
     assert all((corner == found).all(axis=1).any() for corner in np.eye(m))
 
 
-def test_the_size_of_a_population_is_the_one_given_or_follows_from_the_objectives():
-    assert population_size(None, 7, None) == population_size(3, 7, 4) == 7
-    assert population_size(None, None, None) is population_size(None, None, 4) is None
-
-
 def test_too_few_individuals_for_their_directions_are_refused():
     for good in ((2, 2, None), (3, None, None), (3, 15, 4), (3, 30, 4)):
         check_directions("NSGA3", *good)
@@ -185,14 +175,6 @@ def test_too_few_individuals_for_their_directions_are_refused():
         with pytest.raises(ValueError) as caught:
             check_directions("NSGA3", *wrong)
         assert str(caught.value) == message
-
-
-def test_the_cheapest_pairs_come_first():
-    costs = np.array([[3.0, 2.0, 9.0], [1.0, 4.0, 9.0]])
-    rows, columns = pair_up(costs)
-    assert rows.tolist() == [1, 0] and columns.tolist() == [0, 1]
-    assert costs.tolist() == [[3.0, 2.0, 9.0], [1.0, 4.0, 9.0]]
-    assert [len(side) for side in pair_up(np.empty((0, 3)))] == [0, 0]
 
 
 @pytest.mark.parametrize(("m", "population"), [(9, 10), (10, 13), (11, 70), (13, 100), (15, 150), (40, 41)])

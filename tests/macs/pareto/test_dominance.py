@@ -4,7 +4,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from macs.pareto.dominance import alpha_nondominated, constrained_dominates, dominates, extremes, nondominated
+from macs.evaluation.evaluator import CONVERGED, INFEASIBLE, Evaluation
+from macs.pareto.dominance import (
+    alpha_nondominated,
+    constrained_dominates,
+    distinct,
+    dominates,
+    extremes,
+    feasible_and_no_worse,
+    nearest,
+    nondominated,
+    normalised,
+    ranges,
+    slack,
+)
 
 FRONTS = st.integers(1, 4).flatmap(
     lambda m: arrays(float, st.tuples(st.integers(1, 15), st.just(m)), elements=st.integers(0, 4).map(float))
@@ -33,6 +46,8 @@ def test_rows_with_nan_are_never_kept_and_never_dominate():
     assert nondominated(np.full((2, 2), np.nan)).tolist() == [False, False]
     assert nondominated(np.empty((0, 2))).shape == (0,)
     assert not dominates(F[0], F[2])
+    F = np.array([[0.0, 5.0], [0.0, 3.0], [2.0, 1.0], [1.0, 1.0]])
+    assert extremes(F).tolist() == [1, 3]
 
 
 @pytest.mark.parametrize(
@@ -60,11 +75,6 @@ def test_feasible_points_are_compared_by_objectives_within_the_tolerance():
         assert not constrained_dominates(np.ones(2), np.float64(violation), np.zeros(2), np.float64(other), tolerance=1e-6)
 
 
-def test_extremes_break_ties_by_the_other_objectives():
-    F = np.array([[0.0, 5.0], [0.0, 3.0], [2.0, 1.0], [1.0, 1.0]])
-    assert extremes(F).tolist() == [1, 3]
-
-
 def test_points_far_worse_for_a_little_of_one_objective_are_left_out_but_not_the_best():
     a = np.linspace(0.2, 1.3, 6)
     F = np.stack([np.cos(a), np.sin(a), np.linspace(0.4, 0.6, 6)], axis=1)
@@ -73,8 +83,52 @@ def test_points_far_worse_for_a_little_of_one_objective_are_left_out_but_not_the
     assert nondominated(far).all()
     assert alpha_nondominated(F).all()
     assert alpha_nondominated(far).tolist() == [True] * 6 + [False, True]
-
-
-def test_an_objective_that_is_the_same_at_all_points_charges_nothing():
     F = np.array([[0.0, 1.0], [0.5, 0.4], [1.0, 0.0], [0.9, 0.39]])
     assert alpha_nondominated(np.column_stack([F, np.full(4, 1e20)])).tolist() == alpha_nondominated(F).tolist()
+
+
+def results(F: list[list[float]], status: str = CONVERGED) -> Evaluation:
+    return Evaluation(np.zeros((len(F), 1)), np.array(F), np.zeros(len(F)), np.full(len(F), status))
+
+
+@given(st.integers(0, 1), st.floats(1e-3, 1e6), st.booleans())
+def test_a_result_that_is_worse_in_one_objective_is_not_taken_however_much_better_it_is_in_the_others(k, span, far):
+    """Worse by a hundredth of the range, or only by a hundred-thousandth; what is worse by less than rounding may be taken."""
+    F, scale = np.array([[3.0, -2.0]]), np.array([span, span])
+    worse = F - scale
+    worse[0, k] = F[0, k] + (1e-2 if far else 1e-5) * span
+    assert not feasible_and_no_worse(results(worse.tolist()), F, np.zeros(1), scale)[0]
+    worse[0, k] = F[0, k] + 1e-8 * span
+    assert feasible_and_no_worse(results(worse.tolist()), F, np.zeros(1), scale)[0]
+
+
+def test_what_is_equal_is_no_worse_and_what_failed_is_never_taken():
+    F = np.array([[1.0, 2.0]])
+    assert feasible_and_no_worse(results(F.tolist()), F, np.zeros(1), np.ones(2))[0]
+    for status in (INFEASIBLE, "failed", "timeout"):
+        assert not feasible_and_no_worse(results([[0.0, 0.0]], status), F, np.zeros(1), np.ones(2))[0]
+    assert not feasible_and_no_worse(results([[np.nan, 0.0]]), F, np.zeros(1), np.ones(2))[0]
+    F, unit = np.zeros((2, 2)), np.ones(2)
+    assert slack(np.array([0.0, 1e-6])) == pytest.approx([1e-7, 1e-7 + 1e-5])
+    found = results([[5e-6, 0.0], [5e-6, 0.0]])
+    assert feasible_and_no_worse(found, F, np.array([0.0, 1e-6]), unit).tolist() == [False, True]
+    assert not feasible_and_no_worse(results([[2e-5, 0.0]]), F[:1], np.array([1e-6]), unit)[0]
+
+
+def test_ranges_neighbours_normalised_values_and_points_that_differ_by_rounding():
+    F = np.array([[1.0, 7.0, -0.5], [4.0, 7.0, -0.5]])
+    assert ranges(F).tolist() == [3.0, 7.0, 1.0]
+    assert ranges(-F).tolist() == [3.0, 7.0, 1.0]
+    # In the units as they are the second would be the nearer one.
+    F = np.array([[100.0, 0.0], [0.0, 3.0], [0.0, 0.0]])
+    assert nearest(np.zeros(2), F, np.array([1000.0, 1.0])).tolist() == [2, 0, 1]
+    assert nearest(np.zeros(2), F, np.array([1.0, 1.0])).tolist() == [2, 1, 0]
+    ideal, nadir = np.array([1.0, -10.0, 3.0]), np.array([3.0, 10.0, 3.0])
+    assert normalised(np.array([[1.0, -10.0, 3.0], [3.0, 10.0, 5.0], [2.0, 5.0, 2.0]]), ideal, nadir).tolist() == [
+        [0.0, 0.0, 0.0],
+        [1.0, 1.0, 2.0],
+        [0.5, 0.75, -1.0],
+    ]
+    F = np.array([[0.0, 10.0], [1e-9, 10.0 - 1e-8], [0.5, 5.0], [1.0, 0.0], [0.6, 5.5]])
+    assert distinct(F, np.array([1.0, 10.0])).tolist() == [True, False, True, True, False]
+    assert distinct(F, np.array([1e-3, 1e-2])).tolist() == [True, True, True, True, False]

@@ -51,20 +51,21 @@ def test_as_many_as_asked_for_with_the_best_of_each_objective(m, seed, whole):
     assert (best <= F.min(axis=0) + 1e-6 * np.ptp(F, axis=0)).all()
 
 
-def test_of_equally_good_values_the_point_that_is_better_elsewhere():
-    F = np.array([[0.0, 5.0, 5.0, 5.0], [1e-9, 1.0, 1.0, 1.0], [0.1, 0.5, 0.5, 0.5], [1.0, 0.0, 0.0, 0.0]])
-    assert nearly_best(F, F.sum(axis=1)).tolist() == [1, 3, 3, 3]
-
-
-def test_scales_are_those_of_the_corners_not_of_points_far_behind():
+def test_scales_are_those_of_the_corners_and_no_more_than_the_ranges():
     F = np.vstack([2.0 * np.eye(4), np.full((1, 4), 0.9), [[0.0, 0.01, 0.01, 50.0]]])
     assert np.allclose(intercepts(F), 2.0, rtol=0.02)
     assert np.allclose(intercepts(F * SCALES[:4] - 3.0), 2.0 * SCALES[:4], rtol=0.02)
-
-
-def test_scales_are_the_ranges_where_the_plane_of_the_corners_cuts_no_axis():
     flat = np.array([[0.0, 1.0, 2.0, 3.0], [1.0, 0.0, 3.0, 3.0], [2.0, 2.0, 2.0, 3.0]])
     assert np.allclose(intercepts(flat), [2.0, 2.0, 1.0, 1.0])
+    corners = np.array([[0.9, 0.3, 0.0, 0.0], [0.0, 0.9, 0.3, 0.0], [0.0, 0.0, 0.9, 0.3], [0.3, 0.0, 0.0, 0.9]])
+    assert intercepts(corners).tolist() == [0.9] * 4
+    F = np.hstack([simplex_lattice(4, 3), np.full((20, 1), 7.0)])
+    assert intercepts(F).tolist() == [1.0] * 5
+    total = F[:, :4] @ [1.0, 2.0, 3.0, 4.0]
+    with np.errstate(all="raise"):
+        assert nearly_best(F, total)[4] == total.argmin()
+    F = np.array([[0.0, 5.0, 5.0, 5.0], [1e-9, 1.0, 1.0, 1.0], [0.1, 0.5, 0.5, 0.5], [1.0, 0.0, 0.0, 0.0]])
+    assert nearly_best(F, F.sum(axis=1)).tolist() == [1, 3, 3, 3]
 
 
 @pytest.mark.parametrize("last", [[0.5, 0.25, 0.25, 1.0], [0.7, 0.7, 0.6, 1.0]])
@@ -72,19 +73,6 @@ def test_scales_are_the_ranges_where_the_plane_runs_along_an_axis_or_meets_it_be
     F = np.vstack([np.eye(3, 4), last])
     with np.errstate(all="raise"):
         assert intercepts(F).tolist() == [1.0] * 4
-
-
-def test_an_objective_that_does_not_vary_has_no_part_in_what_is_chosen():
-    F = np.hstack([simplex_lattice(4, 3), np.full((20, 1), 7.0)])
-    assert intercepts(F).tolist() == [1.0] * 5
-    total = F[:, :4] @ [1.0, 2.0, 3.0, 4.0]
-    with np.errstate(all="raise"):
-        assert nearly_best(F, total)[4] == total.argmin()
-
-
-def test_no_scale_is_more_than_the_range():
-    corners = np.array([[0.9, 0.3, 0.0, 0.0], [0.0, 0.9, 0.3, 0.0], [0.0, 0.0, 0.9, 0.3], [0.3, 0.0, 0.0, 0.9]])
-    assert intercepts(corners).tolist() == [0.9] * 4
 
 
 @pytest.mark.parametrize(("share", "wins"), [(1.1, False), (0.9, True)])

@@ -36,21 +36,21 @@ def test_a_point_on_the_front_takes_the_place_of_one_behind_it_though_that_has_m
     behind = spread(F, 4)
     assert behind.tolist() == [True, True, True, True, False]
     assert fought(F, behind, [0, 1, 2]).tolist() == [True, True, True, False, True]
-
-
-def test_a_point_that_is_as_near_but_has_less_room_does_not():
     F = np.array([[0.0, 1.0], [1.0, 0.0], [0.5, 0.5], [0.2, 0.8]])
     chosen = np.array([True, True, True, False])
     assert fought(F, chosen, [0, 1]).tolist() == chosen.tolist()
     other = np.array([True, True, False, True])
     assert fought(F, other, [0, 1]).tolist() == chosen.tolist()
-
-
-def test_points_that_stay_lose_to_no_one():
     F = np.array([[0.0, 1.0], [1.0, 0.0], [0.49, 0.6], [0.5, 0.5]])
     chosen = np.array([True, True, True, False])
     assert fought(F, chosen, [0, 1]).tolist() == [True, True, False, True]
     assert fought(F, chosen, [0, 1, 2]).tolist() == chosen.tolist()
+    F = behind_a_surface(np.random.default_rng(3), 40, 2, 0.1)
+    F = F[nondominated(F)]
+    chosen = np.zeros(len(F), dtype=bool)
+    chosen[extremes(F)] = chosen[:5] = True
+    flat = np.column_stack([F, np.full(len(F), 7.0)])
+    assert np.array_equal(fought(flat, chosen, extremes(F)), fought(F, chosen, extremes(F)))
 
 
 @given(st.integers(2, 3), st.integers(4, 12), st.integers(0, 2**32 - 1), st.lists(st.integers(-8, 8), min_size=3, max_size=3))
@@ -66,15 +66,6 @@ def test_as_many_points_with_the_fixed_ones_in_any_units(m, limit, seed, powers)
     assert kept.sum() == chosen.sum()
     assert kept[best].all()
     assert np.array_equal(fought(F * 2.0 ** np.array(powers[:m]), chosen, best), kept)
-
-
-def test_an_objective_without_range_changes_nothing():
-    F = behind_a_surface(np.random.default_rng(3), 40, 2, 0.1)
-    F = F[nondominated(F)]
-    chosen = np.zeros(len(F), dtype=bool)
-    chosen[extremes(F)] = chosen[:5] = True
-    flat = np.column_stack([F, np.full(len(F), 7.0)])
-    assert np.array_equal(fought(flat, chosen, extremes(F)), fought(F, chosen, extremes(F)))
 
 
 @pytest.mark.parametrize(("m", "power", "part"), [(2, 2.0, 0.9), (3, 8.0, 0.6)])

@@ -74,11 +74,8 @@ def test_a_finer_mesh_confirms_what_is_right():
     problem.minimize("effort", phase.integral(u**2))
     _, fine = refined(problem, MultipleShooting(4))
     mesh = method_of(fine).mesh_of("run")
-    assert (
-        fine.note == ""
-        and np.diff(mesh.edges) == pytest.approx(1 / 6, abs=5e-3)
-        and fine.objectives["effort"] == pytest.approx(0.5, abs=1e-7)
-    )
+    assert fine.note == "" and np.diff(mesh.edges) == pytest.approx(1 / 6, abs=5e-3)
+    assert fine.objectives["effort"] == pytest.approx(0.5, abs=1e-7)
 
 
 def swinging(bounds: tuple[float, float] = (-5, 5)) -> Problem:

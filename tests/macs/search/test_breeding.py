@@ -35,6 +35,11 @@ def test_mates_are_mostly_near():
     found = breeding.mates(box(1), np.tile(pool[:1], (1000, 1)), pool, np.random.default_rng(0), 0.3)
     near = (found < (breeding.NEAREST_MATES + 0.5) / 400).all(axis=(0, 2)).mean()
     assert 0.65 < near < 0.75
+    pool = np.linspace(0.0, 1.0, 101)[:, None]
+    X = np.zeros((400, 1))
+    everywhere = breeding.mates(box(1), X, pool, np.random.default_rng(0), wide=1.0)
+    assert np.histogram(everywhere, bins=4, range=(0, 1))[0].min() > 200
+    assert (breeding.mates(box(1), X, pool, np.random.default_rng(0), wide=0.0) <= 0.21).all()
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])
@@ -80,14 +85,6 @@ def test_a_constraint_with_many_local_optima_is_satisfied(seed):
     """C1-DTLZ1 (Jain and Deb 2014): feasible is only what is near the front. With shorter steps these two of ten searches found two
     feasible points, or none."""
     assert len(MACS(archive=100).minimize(get_problem("c1dtlz1"), evaluations=30_000, seed=seed)) == 100
-
-
-def test_mates_are_from_the_whole_pool_where_that_is_asked_for():
-    pool = np.linspace(0.0, 1.0, 101)[:, None]
-    X = np.zeros((400, 1))
-    everywhere = breeding.mates(box(1), X, pool, np.random.default_rng(0), wide=1.0)
-    assert np.histogram(everywhere, bins=4, range=(0, 1))[0].min() > 200
-    assert (breeding.mates(box(1), X, pool, np.random.default_rng(0), wide=0.0) <= 0.21).all()
 
 
 @given(SEEDS, st.integers(1, 40), st.integers(1, 6), st.booleans())

@@ -79,50 +79,42 @@ def test_limits_on_one_side_are_not_taken_for_absolute_values(d, monkeypatch):
     assert changed <= 2
 
 
-def test_variables_at_a_bound_leave_the_rest_to_the_others():
+def test_steps_end_at_bounds_go_the_shorter_way_and_not_far():
     """The nearest point of the plane x1 + x2 + x3 = 0.6 in the box, from (0.02, 0.5, 0.5), has x1 = 0: (0, 0.3, 0.3)."""
     rng, x = np.random.default_rng(1), np.array([0.02, 0.5, 0.5])
     known = around(x, 0.4, 8, lambda X: X.sum(axis=1, keepdims=True) - 0.6, rng)
     step = steps_to_zero(box(3), x[None], np.array([[0.42]]), known)[0]
     over = MODEL_LIMITS.beyond * 0.42 / 2
     assert x + step == pytest.approx([0.0, 0.3 - over, 0.3 - over], abs=1e-9)
-
-
-def test_what_no_point_of_the_box_can_meet_ends_at_its_corner():
     rng, x = np.random.default_rng(1), np.array([0.9, 0.8])
     known = around(x, 0.3, 5, lambda X: X.sum(axis=1, keepdims=True) + 1.0, rng)
     far = np.vstack([known.X, [[-1.0, -1.0]]])
     step = steps_to_zero(box(2), x[None], np.array([[2.7]]), ResidualSamples(far, far.sum(axis=1, keepdims=True) + 1.0))[0]
     assert x + step == pytest.approx([0.0, 0.0], abs=1e-9)
-
-
-def test_constraints_that_say_nearly_the_same_do_not_drive_a_step_far():
-    """x1 = 0.4 and x1 + 1e-6 x2 = 0.41 are both zero at x2 = 10,000 only: the step ends between the two planes."""
+    x = np.array([0.98, 0.5])
+    X = np.array([[0.02, 0.5], [0.96, 0.5], [0.98, 0.6]])
+    turn = lambda X: (np.mod(X[:, :1] - 0.5, 1.0) - 0.5) - 0.01  # noqa: E731 - 0 at 0.01, which is beyond the bound
+    step = steps_to_zero(box(2, [0]), x[None], turn(x[None]), ResidualSamples(X, turn(X)))[0]
+    assert step == pytest.approx([0.03 * (1.0 + MODEL_LIMITS.beyond), 0.0], abs=1e-9)
+    # x1 = 0.4 and x1 + 1e-6 x2 = 0.41 are both zero at x2 = 10,000 only: the step ends between the two planes.
     rng, x = np.random.default_rng(1), np.array([0.5, 0.5])
     A, b = np.array([[1.0, 0.0], [1.0, 1e-6]]), np.array([0.4, 0.41])
     step = steps_to_zero(box(2), x[None], (A @ x - b)[None], around(x, 0.4, 6, lambda X: X @ A.T - b, rng))[0]
     assert step == pytest.approx([-0.095 * (1.0 + MODEL_LIMITS.beyond), 0.0], abs=1e-6)
 
 
-def test_steps_take_the_shorter_way_around():
-    x = np.array([0.98, 0.5])
-    X = np.array([[0.02, 0.5], [0.96, 0.5], [0.98, 0.6]])
-    turn = lambda X: (np.mod(X[:, :1] - 0.5, 1.0) - 0.5) - 0.01  # noqa: E731 - 0 at 0.01, which is beyond the bound
-    step = steps_to_zero(box(2, [0]), x[None], turn(x[None]), ResidualSamples(X, turn(X)))[0]
-    assert step == pytest.approx([0.03 * (1.0 + MODEL_LIMITS.beyond), 0.0], abs=1e-9)
-
-
-def test_no_step_is_longer_than_what_is_known_reaches():
+def test_no_step_is_longer_than_what_is_known_reaches_and_only_the_last_points_are_kept():
     x = np.array([0.5])
     known = ResidualSamples(np.array([[0.51], [0.49]]), np.array([[0.99], [1.01]]))
     assert steps_to_zero(box(1), x[None], np.array([[1.0]]), known)[0] == pytest.approx([0.01])
-
-
-def test_where_nothing_else_is_known_no_step_is_made():
     x = np.array([[0.5, 0.5]])
     assert not steps_to_zero(box(2), x, np.array([[1.0]]), ResidualSamples(x, np.array([[1.0]]))).any()
     flat = ResidualSamples(np.array([[0.4, 0.5], [0.6, 0.5]]), np.ones((2, 1)))
     assert not steps_to_zero(box(2), x, np.array([[1.0]]), flat).any()
+    first = ResidualSamples.none(1).joined(np.zeros((KEPT_SAMPLES, 1)), np.zeros((KEPT_SAMPLES, 2)))
+    both = first.joined(np.ones((3, 1)), np.ones((3, 2)))
+    assert len(first) == len(both) == KEPT_SAMPLES and both.X.sum() == 3.0 and both.residuals.sum() == 6.0
+    assert repr(both) == f"<ResidualSamples: {KEPT_SAMPLES} with 2 residuals>"
 
 
 def test_a_few_steps_lead_to_a_curved_constraint():
@@ -137,10 +129,3 @@ def test_a_few_steps_lead_to_a_curved_constraint():
             x = x + steps_to_zero(box(5), x[None], sphere(x[None]), known)[0]
             known = known.joined(x[None], sphere(x[None]))
         assert abs(sphere(x[None])[0, 0]) < 1e-5
-
-
-def test_only_the_last_points_are_kept():
-    first = ResidualSamples.none(1).joined(np.zeros((KEPT_SAMPLES, 1)), np.zeros((KEPT_SAMPLES, 2)))
-    both = first.joined(np.ones((3, 1)), np.ones((3, 2)))
-    assert len(first) == len(both) == KEPT_SAMPLES and both.X.sum() == 3.0 and both.residuals.sum() == 6.0
-    assert repr(both) == f"<ResidualSamples: {KEPT_SAMPLES} with 2 residuals>"

@@ -36,9 +36,6 @@ def test_the_ends_of_the_front_and_a_compromise() -> None:
     np.testing.assert_allclose(np.diag(state.optima.F[:2]), np.diag(ends.F), rtol=1e-6)
     assert len(state.optima) == 3 and (state.optima.F[2] > state.optima.F[:2].min(axis=0)).all()
     assert len(state.archive) == 3 and evaluator.counts.gradient_solves >= 5
-
-
-def test_without_gradients_or_time_there_are_none() -> None:
     assert not len(begun(evaluator_of_vectors(), refine=False).optima)
     evaluator = evaluator_of_vectors()
     evaluator.evaluate(evaluator.first_guess(evaluator.lower[None]))  # builds what it needs, which is not begun either

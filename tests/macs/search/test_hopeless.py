@@ -83,14 +83,9 @@ def test_it_goes_on_where_something_is_feasible():
 
 
 def test_what_is_only_propagated_is_no_reason_to_end():
-    front = MACS(agents=5, archive=5, mesh="fixed", refine=False).solve(
-        ride(-0.5), DFET(3, 3), evaluations=300, seed=1, verify=None, inner="propagate"
-    )
+    solver = MACS(agents=5, archive=5, mesh="fixed", refine=False)
+    front = solver.solve(ride(-0.5), DFET(3, 3), evaluations=300, seed=1, verify=None, inner="propagate")
     assert len(front) == 0 and front.stats["evaluations"] == 300 and "solves for feasibility" not in front.message
-
-
-def test_black_boxes_go_on():
-    front = MACS(agents=5, archive=5).minimize(
-        lambda X: (np.column_stack([X[:, 0], 1 - X[:, 0]]), np.ones((len(X), 1))), [(0, 1)] * 2, evaluations=200, seed=1
-    )
+    function = lambda X: (np.column_stack([X[:, 0], 1 - X[:, 0]]), np.ones((len(X), 1)))  # noqa: E731
+    front = MACS(agents=5, archive=5).minimize(function, [(0, 1)] * 2, evaluations=200, seed=1)
     assert len(front) == 0 and front.stats["evaluations"] == 200

@@ -7,15 +7,7 @@ from hypothesis import strategies as st
 
 from macs.evaluation.evaluator import UnitBox
 from macs.pareto.directions import pair_up
-from macs.search.individual import (
-    acting_agents,
-    along_archive,
-    coordinate_step,
-    differential,
-    distinct_others,
-    inertia,
-    share_evaluations,
-)
+from macs.search.individual import acting_agents, along_archive, coordinate_step, differential, distinct_others, inertia, share_evaluations
 from macs.search.social import current_to_rand, like_improvements, nearest_rows
 from macs.search.state import Credit
 
@@ -82,7 +74,7 @@ def test_periodic_coordinates_wrap_and_others_stop_at_the_bound():
     assert cube.stop_outward(np.array([1.0, 1.0]), np.array([1.0, 1.0])).tolist() == [1.0, 0.0]
 
 
-def test_inertia_stays_without_velocity_and_goes_on_along_it():
+def test_inertia_and_differential_evolution_along_velocities_and_differences():
     rng = np.random.default_rng(0)
     cube, X = box(3), np.full((2, 3), 0.5)
     velocity = np.array([[0.0, 0.0, 0.0], [0.1, -0.2, 0.0]])
@@ -91,6 +83,22 @@ def test_inertia_stays_without_velocity_and_goes_on_along_it():
     step = trial[1] - X[1]
     assert np.allclose(step / step[0], velocity[1] / velocity[1, 0])
     assert 0 < step[0] <= 0.1
+    rng = np.random.default_rng(0)
+    X, donors = np.full((3, 5), 0.5), rng.random((3, 3, 5))
+    assert (differential(box(5), X, donors, 0.9, 0.0, rng) != X).sum(axis=1).tolist() == [1, 1, 1]
+    assert np.array_equal(differential(box(5), X, np.full((3, 3, 5), 0.5), 0.9, 0.9, rng), X)
+    # Where the third agent is the point itself only the difference is left; with F = 0 the way leads straight to the third.
+    cube, X = box(3), np.full((4, 3), 0.5)
+    donors = np.stack([X + np.array([0.2, -0.1, 0.05]), X, X])
+    steps = {F: differential(cube, X, donors, F, 1.0, np.random.default_rng(3)) - X for F in (0.25, 0.5, 1.0)}
+    assert np.allclose(steps[1.0], 2.0 * steps[0.5]) and np.allclose(steps[1.0], 4.0 * steps[0.25])
+    assert np.allclose(steps[1.0] / steps[1.0][:, :1], [1.0, -0.5, 0.25]) and (steps[1.0][:, 0] > 0.0).all()
+    straight = differential(cube, X, np.stack([X + 0.3, X, X + np.array([0.1, 0.2, 0.0])]), 0.0, 1.0, np.random.default_rng(3)) - X
+    assert np.allclose(straight[:, 1], 2.0 * straight[:, 0]) and np.allclose(straight[:, 2], 0.0)
+    cube = box(1, [0])
+    pool = np.array([[0.05], [0.5], [0.9], [0.0]])
+    assert nearest_rows(cube, np.array([[0.0]]), pool, 2).tolist() == [[0, 2]]
+    assert nearest_rows(cube, np.array([[0.0]]), np.zeros((2, 1)), 2).tolist() == [[-1, -1]]
 
 
 @given(SEEDS, st.integers(4, 12))
@@ -103,37 +111,12 @@ def test_parents_are_others_and_all_different(seed, population):
         assert len({agent, *parents[:, agent].tolist()}) == 4
 
 
-def test_differential_evolution_always_changes_something_and_finds_no_step_in_equal_points():
-    rng = np.random.default_rng(0)
-    X, donors = np.full((3, 5), 0.5), rng.random((3, 3, 5))
-    assert (differential(box(5), X, donors, 0.9, 0.0, rng) != X).sum(axis=1).tolist() == [1, 1, 1]
-    assert np.array_equal(differential(box(5), X, np.full((3, 3, 5), 0.5), 0.9, 0.9, rng), X)
-
-
-def test_parents_are_near_and_not_the_point_itself():
-    cube = box(1, [0])
-    pool = np.array([[0.05], [0.5], [0.9], [0.0]])
-    assert nearest_rows(cube, np.array([[0.0]]), pool, 2).tolist() == [[0, 2]]
-    assert nearest_rows(cube, np.array([[0.0]]), np.zeros((2, 1)), 2).tolist() == [[-1, -1]]
-
-
 @given(SEEDS, st.integers(1, 6), st.integers(1, 6))
 def test_pairs_are_one_to_one_and_begin_with_the_cheapest(seed, rows, columns):
     costs = np.random.default_rng(seed).random((rows, columns))
     first, second = pair_up(costs)
     assert len(first) == len(second) == min(rows, columns) == len(set(first)) == len(set(second))
     assert costs[first[0], second[0]] == costs.min()
-
-
-def test_the_difference_of_two_agents_is_weighted_by_F():
-    """Where the third agent is the point itself only the difference is left; with F = 0 the way leads straight to the third."""
-    cube, X = box(3), np.full((4, 3), 0.5)
-    donors = np.stack([X + np.array([0.2, -0.1, 0.05]), X, X])
-    steps = {F: differential(cube, X, donors, F, 1.0, np.random.default_rng(3)) - X for F in (0.25, 0.5, 1.0)}
-    assert np.allclose(steps[1.0], 2.0 * steps[0.5]) and np.allclose(steps[1.0], 4.0 * steps[0.25])
-    assert np.allclose(steps[1.0] / steps[1.0][:, :1], [1.0, -0.5, 0.25]) and (steps[1.0][:, 0] > 0.0).all()
-    straight = differential(cube, X, np.stack([X + 0.3, X, X + np.array([0.1, 0.2, 0.0])]), 0.0, 1.0, np.random.default_rng(3)) - X
-    assert np.allclose(straight[:, 1], 2.0 * straight[:, 0]) and np.allclose(straight[:, 2], 0.0)
 
 
 def test_as_many_agents_without_a_direction_act_as_there_are_others():

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from macs import MACS
+from macs import MACS, NSGA2
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import Evaluation
 from macs.search.state import Credit
@@ -32,14 +32,8 @@ def test_proposals_go_to_the_solver_that_brings_most_for_its_work():
     assert set(choose_inner_solvers(credit, spent, 10, None)) == {1}
     credit.gained[0] = 1.0
     assert (choose_inner_solvers(credit, spent, 10, None) == 0).sum() >= 9
-
-
-def test_where_gradient_solves_bring_most_proposals_are_propagated():
     ways = known((0.1, 100, 5000, 500), (0.8, 200, 50000, 100), (0.1, 500, 50000, 50), (2.0, 100, 1000, 1))
     assert (choose_inner_solvers(*ways, 10, 20) == 0).all()
-
-
-def test_a_solver_that_takes_less_has_its_share_of_evaluations():
     credit, spent = known((0.0, 100, 50, 9), (0.8, 200, 5000, 90), (0.0, 1, 5000, 1), NO_SOLVES)
     assert (choose_inner_solvers(credit, spent, 10, None) == 0).all()
     spent[0, 1] += 2.0
@@ -142,8 +136,6 @@ def test_a_divided_search_goes_on_to_the_same_bits(tmp_path):
 
 @pytest.mark.slow
 def test_others_use_the_fixed_rule():
-    from macs import NSGA2
-
     projected, auto = (
         NSGA2(population=8).solve(load("goddard"), parse("dfet:3x3"), evaluations=40, seed=1, inner=inner, verify=None)
         for inner in ("projection", "auto")

@@ -37,14 +37,10 @@ def schaffer(X):
 @pytest.mark.parametrize("settings", [MACS(agents=3, archive=4), MACS(), MACS.paper()])
 def test_the_budget_is_met_exactly(budget, settings):
     rows = []
-
-    def function(X):
-        rows.append(len(X))
-        return schaffer(X)
-
-    state = run(settings, boxed(function, [(-2, 2)] * 3), budget)
+    box = boxed(lambda X: rows.append(len(X)) or schaffer(X), [(-2, 2)] * 3)
+    state = run(settings, box, budget)
     assert sum(rows) == budget == state.evaluations
-    settings.advance(state, boxed(function, [(-2, 2)] * 3), 0)
+    settings.advance(state, box, 0)
     assert sum(rows) == budget
 
 
@@ -53,9 +49,6 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     assert np.array_equal(first.archive.Z, again.archive.Z)
     assert np.array_equal(first.agents.velocity, again.agents.velocity)
     assert not np.array_equal(first.archive.F, other.archive.F)
-
-
-def test_the_state_is_all_there_is_to_go_on_from():
     settings, box = MACS(), boxed(schaffer, [(-2, 2)] * 4)
     state = settings.begin(box, 600, np.random.default_rng(0))
     while state.evaluations < 300:
@@ -71,24 +64,7 @@ def test_the_state_is_all_there_is_to_go_on_from():
     assert state.iteration == kept.iteration
 
 
-def test_nothing_feasible_leaves_the_archive_empty_and_tells_the_closest():
-    box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
-    state = run(MACS(), box, 1000)
-    assert len(state.archive) == 0
-    assert len(state.closest) == 1 and len(state.infeasible) == 10
-    assert 1.0 <= state.closest.violation[0] < 1.02 and (np.diff(state.infeasible.violation) >= 0.0).all()
-    assert state.closest.violation[0] <= state.agents.violation.min()
-
-
-def test_from_infeasible_to_feasible():
-    box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: np.abs(X[:, 1:] - 0.5) - 0.05)
-    state = run(MACS(), box, 1500)
-    assert len(state.archive) == 10
-    assert len(state.closest) == 0
-    assert (np.abs(state.archive.Z[:, 1:] - 0.5) <= 0.05 + 1e-6).all()
-
-
-def test_failed_evaluations_never_enter_the_archive():
+def test_failed_and_infeasible_evaluations_never_enter_the_archive():
     def function(X):
         F = schaffer(X)
         F[X[:, 0] > 0.3] = np.nan
@@ -102,17 +78,30 @@ def test_failed_evaluations_never_enter_the_archive():
     nothing = run(MACS(), boxed(lambda X: np.full((len(X), 2), np.nan), [(0, 1)] * 2), 300)
     assert len(nothing.archive) == 0
     assert nothing.evaluations == 300
+    box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: np.abs(X[:, 1:] - 0.5) - 0.05)
+    state = run(MACS(), box, 1500)
+    assert len(state.archive) == 10
+    assert len(state.closest) == 0
+    assert (np.abs(state.archive.Z[:, 1:] - 0.5) <= 0.05 + 1e-6).all()
+    box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
+    state = run(MACS(), box, 1000)
+    assert len(state.archive) == 0
+    assert len(state.closest) == 1 and len(state.infeasible) == 10
+    assert 1.0 <= state.closest.violation[0] < 1.02 and (np.diff(state.infeasible.violation) >= 0.0).all()
+    assert state.closest.violation[0] <= state.agents.violation.min()
 
 
-def test_one_objective():
+def test_one_objective_one_that_does_not_vary_and_more_than_there_are_points():
     state = run(MACS(), boxed(lambda X: ((X - 0.3) ** 2).sum(axis=1), [(-2, 2)] * 5), 2000)
     assert state.archive.F.shape == (1, 1)
     assert state.archive.F[0, 0] < 1e-4
-
-
-def test_an_objective_that_does_not_vary():
     state = run(MACS(), boxed(lambda X: np.hstack([schaffer(X), np.ones((len(X), 1))]), [(-2, 2)] * 2), 500)
     assert len(state.archive) == 10
+    box = boxed(lambda X: np.hstack([schaffer(X), X]), [(-2, 2)] * 3)
+    with pytest.raises(ValueError, match="5 objectives, not 4"):
+        MACS(archive=4).begin(box, 100, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="leaves none"):
+        MACS().begin(boxed(schaffer, [(-2, 2)]), 0, np.random.default_rng(0))
 
 
 def test_periodic_variables_cross_their_bounds():
@@ -169,27 +158,11 @@ def test_of_too_many_starts_the_best_become_agents(monkeypatch):
     assert begun(infeasible + dominated + front, 11) == infeasible + dominated + front
 
 
-def test_more_objectives_than_points_and_no_budget_are_refused():
-    box = boxed(lambda X: np.hstack([schaffer(X), X]), [(-2, 2)] * 3)
-    with pytest.raises(ValueError, match="5 objectives, not 4"):
-        MACS(archive=4).begin(box, 100, np.random.default_rng(0))
-    with pytest.raises(ValueError, match="leaves none"):
-        MACS().begin(boxed(schaffer, [(-2, 2)]), 0, np.random.default_rng(0))
-
-
 @pytest.mark.parametrize(
     "setting",
     [
-        {"agents": 2},
-        {"agents": 3.5},
-        {"archive": 0},
-        {"mesh_tolerance": 0},
-        {"mesh": "fine"},
-        {"refine": 1},
-        {"polish_every": 0},
-        {"ceiling": None},
-        {"variant": "quick"},
-        {"variant": 3},
+        *({"agents": 2}, {"agents": 3.5}, {"archive": 0}, {"mesh_tolerance": 0}, {"mesh": "fine"}, {"refine": 1}),
+        *({"polish_every": 0}, {"ceiling": None}, {"variant": "quick"}, {"variant": 3}),
     ],
 )
 def test_settings_out_of_range_are_named(setting):
@@ -214,9 +187,6 @@ def test_variants_have_names():
     assert MACS.paper().about()["settings"]["variant"] == "paper" and MACS().about()["settings"]["variant"] == "default"
     own = MACS(variant=Variant(repair=False))
     assert own.about()["settings"]["variant"]["repair"] is False and own != MACS()
-
-
-def test_settings_of_the_paper():
     assert MACS.paper(archive=20).archive == 20
     assert MACS.paper().coordinates_to_scan(29, 10, 2, 100) == 29
     assert MACS().coordinates_to_scan(29, 10, 2, 10_000) == 1

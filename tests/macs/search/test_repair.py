@@ -143,9 +143,6 @@ def test_points_whose_evaluation_fails_are_no_sample():
     while state.evaluations < 1000:
         MACS(archive=20).advance(state, evaluator, 1000)
     assert np.isfinite(state.samples.residuals).all() and state.samples.X[:, 0].max() <= 0.75 and len(state.archive) == 20
-
-
-def test_a_function_that_returns_another_number_of_constraints_is_refused():
     calls = []
 
     def function(X):

@@ -38,13 +38,6 @@ def after(known: Rounds, found: np.ndarray, evaluations: int, multimodal: bool =
     return next_round(known, found, np.empty((0, 2)), np.inf, EVERY, evaluations, work, True, multimodal, ceiling)
 
 
-def test_points_on_the_lines_between_points_are_no_progress():
-    coarse = QUARTER[::8]
-    middle = 0.5 * (coarse[:-1] + coarse[1:])
-    assert beyond(middle, coarse).max() < 1e-9 and not improves(middle, coarse, ONE, EVERY)
-    assert gains(coarse, coarse, ONE, EVERY) == (0.0, 0.0, 0.0)
-
-
 @settings(max_examples=50, deadline=None)
 @given(st.floats(0.0, 0.2), st.integers(0, 40))
 def test_the_distance_beyond_a_front(distance, k):
@@ -55,23 +48,21 @@ def test_the_distance_beyond_a_front(distance, k):
     assert found >= distance - 3 * sag or k in (0, 40)
 
 
-def test_a_better_part_of_the_front_is_progress_and_so_is_a_better_end():
+def test_what_is_progress_beyond_a_front_of_many_points_or_one():
     better = QUARTER[18:23] - 0.05
     volume, mean, end = gains(better, QUARTER, ONE, EVERY)
     assert volume > 1e-3 and mean > 1e-3 and end == 0.0
     assert gains(np.array([[-0.01, 1.0]]), QUARTER, ONE, EVERY)[2] == pytest.approx(0.01 / 1.01)
     assert not improves(QUARTER - 0.5 * ROUND_LIMITS.beyond, QUARTER, ONE, EVERY)
-
-
-def test_a_front_of_one_point_is_measured_by_what_was_seen():
-    """Objectives in no conflict: rounding is no progress, in whatever units."""
+    coarse = QUARTER[::8]
+    middle = 0.5 * (coarse[:-1] + coarse[1:])
+    assert beyond(middle, coarse).max() < 1e-9 and not improves(middle, coarse, ONE, EVERY)
+    assert gains(coarse, coarse, ONE, EVERY) == (0.0, 0.0, 0.0)
+    # Objectives in no conflict: rounding is no progress, in whatever units.
     extent = np.array([1e6, 1e-6])
     best = np.array([[3.0, 5.0]])
     assert not improves(best - 1e-7 * extent, best, extent, EVERY)
     assert improves(best - 1e-2 * extent, best, extent, EVERY)
-
-
-def test_one_objective_is_measured_by_its_size_where_all_that_was_seen_is_alike():
     best, nearly, only = np.array([[-40.0]]), np.array([1e-5]), np.ones((1, 1))
     assert not improves(best - 1e-4, best, nearly, only)
     assert improves(best - 0.01, best, nearly, only)
@@ -85,7 +76,7 @@ def test_one_objective_ends_soon():
     assert front[0].objectives["time"] == pytest.approx(np.sqrt(2 * 300 * (1 / 1 + 1 / 2)), abs=1e-3)  # 300 m, by up to 1 and -2 m/s2
 
 
-def test_it_ends_after_as_much_without_progress_as_is_stated():
+def test_it_ends_after_as_much_without_progress_as_is_stated_or_at_a_ceiling():
     first = after(Rounds.first(2, True, 10**6), QUARTER, FIRST)
     assert first.end == 2 * FIRST and first.improved == FIRST and not first.stopped
     assert after(first, QUARTER, 2 * FIRST).stopped == DONE
@@ -96,24 +87,15 @@ def test_it_ends_after_as_much_without_progress_as_is_stated():
     long = replace(late, improved=10_000)
     at = int(10_000 * (1 + ROUND_LIMITS.again))
     assert not after(long, QUARTER, at - 1, work=WORK.little).stopped and after(long, QUARTER, at, work=WORK.little).stopped == DONE
-
-
-def test_where_optima_are_several_it_also_ends_after_some_work_only():
     first = after(Rounds.first(2, True, 10**6), QUARTER, FIRST, multimodal=True, work=1000)
     at, enough = 3 * FIRST, 1000 + int(WORK.little)
     assert first.work == 1000 and not after(first, QUARTER, at, multimodal=True, work=enough - 1).stopped
     assert after(first, QUARTER, at, multimodal=True, work=enough).stopped == DONE
     assert after(first, QUARTER, at, work=1000).stopped == DONE
     assert after(first, QUARTER, (1 + ROUND_LIMITS.long) * FIRST, multimodal=True, work=enough - 1).stopped == DONE
-
-
-def test_a_ceiling_ends_it():
     first = after(Rounds.first(2, True, FIRST + 50), QUARTER, FIRST, ceiling=FIRST + 50)
     assert first.end == FIRST + 50 and not first.stopped
     assert after(first, QUARTER - 0.1, FIRST + 50, ceiling=FIRST + 50).stopped == "ceiling"
-
-
-def test_only_the_violation_counts_as_long_as_nothing_is_feasible():
     none = np.empty((0, 2))
 
     def later(known, violation, evaluations):
@@ -168,11 +150,6 @@ def test_a_ceiling():
     assert front.stats["stopped"] == "ceiling" and front.stats["evaluations"] == 100 and len(front) == 6
 
 
-def test_nothing_feasible_ends_soon():
-    front = SMALL.solve(walk(least=0.5), MESH, seed=1)
-    assert front.stats["stopped"] == "settled" and "violates path 'place' of 'walk'" in front.message
-
-
 def test_a_callback_ends_it():
     seen = []
 
@@ -183,6 +160,8 @@ def test_a_callback_ends_it():
 
     front = SMALL.solve(walking(), MESH, seed=1, verify=None, callback=stop)
     assert front.stats["stopped"] == "callback" and len(front) and front.stats["evaluations"] == seen[-1]
+    front = SMALL.solve(walk(least=0.5), MESH, seed=1)
+    assert front.stats["stopped"] == "settled" and "violates path 'place' of 'walk'" in front.message
 
 
 @pytest.mark.slow

@@ -24,12 +24,7 @@ def begun(settings, function=schaffer, d=3):
     box = boxed(function, [(-2, 2)] * d)
     state = settings.begin(box, 10_000, np.random.default_rng(0))
     trials = Trials(settings, state, box, 10_000)
-    return (
-        state,
-        lambda: individual_actions(trials),
-        lambda: social_actions(trials),
-        trials,
-    )
+    return state, lambda: individual_actions(trials), lambda: social_actions(trials), trials
 
 
 def owned(state):
@@ -47,9 +42,6 @@ def test_directions_are_equally_spaced_and_kept_for_the_whole_run():
     while state.evaluations < 600:
         settings.advance(state, box, 600)
         assert np.array_equal(owned(state), first)
-
-
-def test_there_are_as_many_directions_as_agents():
     assert [MACS.paper(agents=n).directions_to_draw_from(2) for n in (4, 20)] == [4, 20] and MACS().directions_to_draw_from(2) == 200
 
 
@@ -82,9 +74,6 @@ def test_pattern_search_leaves_its_displacement():
     individual()
     assert ((state.agents.velocity < 0.0).sum(axis=1) == 1).all()
     assert np.allclose(state.agents.velocity * 4, state.agents.Z)
-
-
-def test_differential_evolution_leaves_none():
     settings = MACS(variant=replace(PAPER, CR=1.0))
     # Off the diagonal everything is worse: only differences of agents on it lead along it.
     state, individual, *_ = begun(settings, lambda X: np.stack([np.abs(X[:, 0]) + 99 * np.abs(X[:, 1] - X[:, 0])] * 2, axis=1), d=2)

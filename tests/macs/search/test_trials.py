@@ -38,7 +38,7 @@ def prepared(settings=None):
     return box, state, Trials(settings, state, box, 1000)
 
 
-def test_the_velocity_is_what_was_achieved():
+def test_velocity_credit_and_memory_are_of_what_was_achieved():
     _, state, trials = prepared()
     rows = np.array([2, 5])
     X = trials.positions(rows)
@@ -47,6 +47,18 @@ def test_the_velocity_is_what_was_achieved():
     assert np.allclose(state.agents.velocity[2], [-0.2, 0.0])
     assert np.allclose(state.agents.Z[2], [0.6, 0.6, 0.5])
     assert (state.agents.velocity[5] == 0.0).all()
+    _, _, trials = prepared()
+    rows = np.array([0, 1])
+    X = trials.positions(rows)
+    assert trials.evaluate_and_accept(rows, X, X + np.array([[-0.01, 0.4], [-0.4, 0.01]])).all()
+    assert trials.successful[:2].tolist() == [False, True]
+    box, _, trials = prepared()
+    trials.state.agents.Z[3, 0] = 0.123
+    rows = np.array([3])
+    X = trials.positions(rows)
+    trials.evaluate_and_accept(rows, X, X - 0.1)
+    assert box.started_from[-1].tolist() == [0.123]
+    assert box.started_from[0].tolist() == [7.0] * 10
 
 
 @pytest.mark.parametrize(
@@ -72,24 +84,6 @@ def test_what_is_only_looked_at_is_seen_and_changes_no_agent():
     assert trials.seen == [result]
     assert state.evaluations == box.counts.evaluations == before.evaluations + 2
     assert all(np.array_equal(value, vars(before.agents)[name]) for name, value in vars(state.agents).items())
-
-
-def test_a_step_that_was_mostly_undone_is_a_success_without_credit():
-    _, _, trials = prepared()
-    rows = np.array([0, 1])
-    X = trials.positions(rows)
-    assert trials.evaluate_and_accept(rows, X, X + np.array([[-0.01, 0.4], [-0.4, 0.01]])).all()
-    assert trials.successful[:2].tolist() == [False, True]
-
-
-def test_candidates_start_from_the_memory_of_their_own_agent():
-    box, _, trials = prepared()
-    trials.state.agents.Z[3, 0] = 0.123
-    rows = np.array([3])
-    X = trials.positions(rows)
-    trials.evaluate_and_accept(rows, X, X - 0.1)
-    assert box.started_from[-1].tolist() == [0.123]
-    assert box.started_from[0].tolist() == [7.0] * 10
 
 
 def test_a_proposal_that_is_only_as_good_for_the_direction_of_its_agent_is_no_success():

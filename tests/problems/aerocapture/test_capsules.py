@@ -44,11 +44,7 @@ def panels(nose: float, front: float, attack: float, n: int = 500) -> tuple[floa
     slope = np.concatenate([np.pi / 2 - polar, np.full(n, front)])
     area = np.concatenate([nose**2 * np.sin(polar) * (np.pi / 2 - front) / n, radius * (1 - edge) / n / np.sin(front)]) * 2 * np.pi / n
     normals = np.array(
-        [
-            -np.sin(slope)[:, None] + 0 * azimuth,
-            np.cos(slope)[:, None] * np.sin(azimuth),
-            np.cos(slope)[:, None] * np.cos(azimuth),
-        ]
+        [-np.sin(slope)[:, None] + 0 * azimuth, np.cos(slope)[:, None] * np.sin(azimuth), np.cos(slope)[:, None] * np.cos(azimuth)]
     )
     flow = np.array([np.cos(attack), 0.0, np.sin(attack)])
     seen = np.maximum(-np.tensordot(flow, normals, 1), 0.0)
