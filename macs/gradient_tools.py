@@ -79,8 +79,9 @@ def optimize(
     starts : int or "auto"
         Number of starts: the first is `start` or the problem's guess, the others are drawn: from everywhere in the bounds, and near the
         best that is known. The best result is returned. "auto": as many as pay; some twenty where each finds the same, fewer where a solve
-        takes long, one where a linear objective is at its bound. `stats` has the number of `starts`, how many different `optima` they
-        found, and how often that which is returned was `found`; if only once, `message` or the `note` says so.
+        takes long, one where a linear objective is at its bound. `stats` of the point has the number of `starts`, how many different
+        `optima` they found, and how often that which is returned was `found`; if only once, its `message` says so: there may be better
+        ones.
     seed : int, optional
         Seed of the starts that are drawn. None draws one, which is recorded in `stats`.
     tolerance : float
@@ -316,7 +317,7 @@ class _Job:
                 self._stopped = str(reason)
                 return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))
             self._stopped = interrupts.reason
-            words = "; ".join(filter(None, [front.message, self._found_once()]))
+            words = "; ".join(filter(None, [front.message, _found_once(self._told())]))
             front = front.replace(stats=front.stats | self._stats(), message=words)
             return front.verify(verify) if self.fixed or verify is None else Front.of(again(front, verify))
 
@@ -340,13 +341,15 @@ class _Job:
                 raise (KeyboardInterrupt(words) if str(reason) == "interrupted" else TimeoutError(words)) from None
             found = search.best(0)
             self._stopped = interrupts.reason
+            told = {"starts": found.rule.converged, "optima": found.optima, "found": found.hits}
             points = from_vectors(
                 found.nlp,
                 found.z[None],
                 self._about,
-                self._stats() | {"starts": found.rule.converged, "optima": found.optima, "found": found.hits},
+                self._stats() | told,
+                message=_found_once({self.problem.goals[i].name: told}),
                 status=[found.status],
-                notes=["; ".join(filter(None, [found.note, found.once]))],
+                notes=[found.note],
                 **certified(found.nlp, found.z[None], None, self._sole),
             )
             if found.status == INFEASIBLE:
@@ -401,12 +404,6 @@ class _Job:
         more |= {"status": status, "notes": notes, **certified(self.nlp, Z, ranges, self._sole)}
         return Front.of(from_vectors(self.nlp, Z, self._about, self._stats(), **more))
 
-    def _found_once(self) -> str:
-        """Words on optima of single objectives that one start alone has found."""
-        once = [i for i, stopping in self._stopping.items() if stopping.hits() == 1 < stopping.starts]
-        names = [f"that of '{self.problem.goals[i].name}' in {self._stopping[i].starts}" for i in once]
-        return f"optima that one start alone found, so that there may be better ones: {', '.join(names)}" if names else ""
-
     def _stats(self) -> dict[str, Any]:
         counts = self.solves.counts
         return costs(
@@ -419,12 +416,22 @@ class _Job:
             **self._starts(),
         )
 
-    def _starts(self) -> dict[str, Any]:
-        """Starts that were made, different optima and how often the best was found: of the only objective that was sought, or by name."""
-        told = {
+    def _told(self) -> dict[str, dict[str, int]]:
+        """Starts that were made, different optima and how often the best was found, by the name of the objective."""
+        return {
             self.problem.goals[i].name: {"starts": one.starts, "optima": one.optima(), "found": one.hits()}
             for i, one in self._stopping.items()
         }
+
+    def _starts(self) -> dict[str, Any]:
+        """The numbers of `_told`: of the only objective that was sought, or by name."""
+        told = self._told()
         if self._sole is not None:
             return next(iter(told.values()), {})
         return {key: {name: numbers[key] for name, numbers in told.items()} for key in ("starts", "optima", "found") if told}
+
+
+def _found_once(told: Mapping[str, Mapping[str, int]]) -> str:
+    """Words on optima of single objectives that one start alone has found."""
+    names = [f"that of '{name}' in {one['starts']}" for name, one in told.items() if one["found"] == 1 < one["starts"]]
+    return f"optima that one start alone found, so that there may be better ones: {', '.join(names)}" if names else ""

@@ -28,7 +28,7 @@ def without_dynamics(name: str) -> str:
 Outputs = Callable[[np.ndarray], Mapping[str, Any]]
 Kind = TypeVar("Kind", bound=Outputs)
 SAMPLED = 8
-"""Rows at which a function is evaluated to know it: few, since one may take long."""
+"""Number of rows at which a function is evaluated to know it: few, since one may take long."""
 Rows = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """`rows(X: (n, d)) -> (objectives (n, m) in the user's senses, values (n, c) that the limits bound)`."""
 
@@ -118,16 +118,20 @@ class CompiledVectorProblem:
         lower, upper, scale = (np.array([getattr(limit, side) for limit in self.limits]) for side in ("lower", "upper", "scale"))
         return F, (np.maximum(bounded - upper, 0.0) - np.maximum(lower - bounded, 0.0)) / scale
 
+    @property
+    def sample(self) -> np.ndarray:
+        """The `SAMPLED` rows (n, d), drawn from the box and always the same, by which the function is known."""
+        lower, upper = (np.array([getattr(v, side) for v in self.variables]) for side in ("lower", "upper"))
+        return np.random.default_rng(0).uniform(lower, upper, (SAMPLED, len(lower)))
+
     @cached_property
     def _sampled(self) -> tuple[np.ndarray, np.ndarray]:
-        """What `rows` returns at fixed rows, drawn from the box."""
-        rng = np.random.default_rng(0)
-        lower, upper = (np.array([getattr(v, side) for v in self.variables]) for side in ("lower", "upper"))
-        return self.rows(rng.uniform(lower, upper, (SAMPLED, len(lower))))
+        """What `rows` returns at the `sample`."""
+        return self.rows(self.sample)
 
     @cached_property
     def sizes(self) -> np.ndarray:
-        """Typical absolute value of each column, over the `SAMPLED` rows: what an equality may miss follows from its unit."""
+        """Typical absolute value of each column, over the `sample`: what an equality may miss follows from its unit."""
         found = np.abs(self._sampled[1])
         usual = [np.median(one[np.isfinite(one)]) if np.isfinite(one).any() else 0.0 for one in found.T]
         return np.array([size or 1.0 for size in usual])
@@ -135,7 +139,7 @@ class CompiledVectorProblem:
     @cached_property
     def fingerprint(self) -> str:
         """A hash of names, bounds, senses, limits, and of the function's values at fixed rows, to nine digits: two problems with the same
-        one are the same. The function is evaluated at `SAMPLED` rows for it, once."""
+        one are the same. The function is evaluated at the `sample` for it, once."""
         values = np.hstack(self._sampled)
         told = ("vector", self.name, self.variables, self.goals, self.limits, *([self.equalities] if self.equalities else []))
         digest = hashlib.sha256(repr(told).encode())

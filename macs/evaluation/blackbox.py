@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import logging
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,9 +14,12 @@ import numpy as np
 from problems.checks import check_text, interval, shown
 from problems.compiled import Objective, Variable
 from problems.vector import SAMPLED, CompiledVectorProblem, real_numbers
+from transcription.stopping import Stopped
 from transcription.trajectories.limits import excess
 
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
+
+log = logging.getLogger(__name__)
 
 
 class BlackBox(Evaluator):
@@ -66,8 +72,12 @@ class BlackBox(Evaluator):
         return np.array(candidates, dtype=float)
 
     def _values(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See `CompiledVectorProblem.evaluate`."""
-        return self.problem.evaluate(Z)
+        """See `CompiledVectorProblem.evaluate`. Ctrl-C that the function hears ends the search."""
+        try:
+            with errors_located(self.problem, Z):
+                return self.problem.evaluate(Z)
+        except KeyboardInterrupt:
+            raise Stopped("interrupted") from None
 
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         F, residuals = self._values(Z)
@@ -79,6 +89,28 @@ class BlackBox(Evaluator):
         F[failed], violation[failed] = np.nan, np.inf
         status = np.where(failed, FAILED, np.where(violation <= self.tolerance, CONVERGED, INFEASIBLE))
         return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status, residuals=residuals), 0
+
+
+@contextmanager
+def errors_located(problem: CompiledVectorProblem, Z: np.ndarray) -> Iterator[None]:
+    """Within, a function is evaluated at rows Z (k, d) or those of the problem's `sample`. Where it raises an error, the first of these at
+    which it does so alone is logged."""
+    try:
+        yield
+    except Stopped:
+        raise
+    except Exception as error:
+        module = [*traceback.walk_tb(error.__traceback__)][-1][0].f_globals.get("__name__")
+        if module not in (__name__, CompiledVectorProblem.__module__):  # these check what it returned
+            where = f"at none of {len(Z)} rows alone, but at all together"
+            for row in (*Z, *problem.sample):
+                try:
+                    problem.rows(row[None].copy())
+                except Exception:
+                    where = "at " + ", ".join(f"{v.name} = {value!r}" for v, value in zip(problem.variables, row.tolist(), strict=True))
+                    break
+            log.error("the function raised %s %s", type(error).__name__, where)
+        raise
 
 
 SENSES = ("minimize", "maximize")

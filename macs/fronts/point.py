@@ -132,6 +132,16 @@ class Point:
         return self._points.notes[self.index]
 
     @property
+    def stats(self) -> dict[str, Any]:
+        """The costs, the seed and what else its front records of the call that found it."""
+        return dict(self._points.stats)
+
+    @property
+    def message(self) -> str:
+        """What its front has to say as a whole, such as an optimum that one start alone has found; usually empty."""
+        return str(self._points.message)
+
+    @property
     def source(self) -> ProblemSource | None:
         """Identity of the problem; None for a black box."""
         return self._points.source

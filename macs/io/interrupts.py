@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
@@ -19,12 +20,13 @@ class Interrupts(AbstractContextManager["Interrupts"]):
     """Clock and Ctrl-C handler of long work; a context manager, within which the work is asked to end (`transcription.stopping`).
 
     In the main thread, the first Ctrl-C only sets `reason`; a second one interrupts at once, as usual. Work that is a part of other such
-    work ends with it, and what interrupts the part interrupts the whole.
+    work ends with it, and what interrupts the part interrupts the whole. Processes that the work has forked, such as a pool of the user's,
+    hear no Ctrl-C: they finish what they were given.
     """
 
     def __init__(self, time_limit: float | None = None, earlier: float = 0.0) -> None:
         self._time_limit, self._earlier = time_limit, earlier
-        self._interrupted = False
+        self._interrupted, self._process = False, os.getpid()
         self._whole: Interrupts | None = None
         self._outer: Asked | None = None
         self._within = ExitStack()
@@ -70,6 +72,8 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         return "time limit" if self._time_limit is not None and self._here > self._time_limit else ""
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        if os.getpid() != self._process:
+            return
         if self._interrupted:
             raise KeyboardInterrupt
         self._interrupted = True

@@ -178,12 +178,6 @@ class MeshedOptimum:
         return self.rule.hits(self.alpha, SEARCH.clearly * self.unit)
 
     @property
-    def once(self) -> str:
-        """Words on an optimum that is the best of several and that one start alone found."""
-        words = f"one of {self.rule.starts} starts found it, which led to {self.optima} optima: there may be better ones"
-        return words if self.hits == 1 < self.optima else ""
-
-    @property
     def note(self) -> str:
         """Why it is not good, or other remarks."""
         note = f"no solve converged: {self.solved.message}" if self.refinement is None else self.refinement.note

@@ -22,7 +22,7 @@ from transcription.smooth import Smooth
 from transcription.stopping import Stopped
 
 from ..evaluation.bilevel import Bilevel
-from ..evaluation.blackbox import BlackBox, plain_problem
+from ..evaluation.blackbox import BlackBox, errors_located, plain_problem
 from ..evaluation.evaluator import Counts
 from ..front import Front
 from ..fronts.builders import from_archive, from_vector_problem, no_points
@@ -304,7 +304,8 @@ class Solver(SearchMethod):
         if isinstance(drawn, Smooth):
             raise ValueError(f"start: {without_dynamics(problem.name)}, so there are no smooth profiles")
         self.check_vector(problem)
-        what = {"problem": {"name": problem.name, "fingerprint": problem.fingerprint}}
+        with errors_located(problem, problem.sample[:0]):
+            what = {"problem": {"name": problem.name, "fingerprint": problem.fingerprint}}
         front = self._search_vector(problem, None if drawn else start, call, what)
         try:
             return Front.of(with_nearest(front)).verify(verify)

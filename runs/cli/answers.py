@@ -59,11 +59,13 @@ def ended_at_once(program: str) -> Iterator[None]:
 def ended_as_by_ctrl_c() -> Iterator[None]:
     """A context in which SIGTERM does what Ctrl-C does: `kill`, `timeout` and the managers of clusters send it before they kill."""
 
+    installed_in = os.getpid()
+
     def as_ctrl_c(number: int, frame: FrameType | None) -> None:
         handler = signal.getsignal(signal.SIGINT)
-        if callable(handler):
+        if callable(handler) and os.getpid() == installed_in:
             handler(signal.SIGINT, frame)
-        else:  # a process in the background may ignore Ctrl-C; SIGTERM is to end it all the same
+        else:  # SIGTERM is to end a process in the background, which may ignore Ctrl-C, and one that was forked, too
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
             signal.raise_signal(signal.SIGTERM)
 

@@ -296,6 +296,28 @@ def test_what_interrupts_a_part_interrupts_the_whole():
                 inner.check()
 
 
+def test_a_forked_process_hears_no_ctrl_c(monkeypatch):
+    with Interrupts() as whole:
+        monkeypatch.setattr(os, "getpid", lambda: 0)
+        for _ in range(2):
+            signal.raise_signal(signal.SIGINT)
+        assert not whole.reason
+
+
+def test_a_second_ctrl_c_in_a_function_returns_what_there_is():
+    seen = []
+
+    def function(X):
+        seen.extend(X)
+        if len(seen) > 100:
+            for _ in range(2):
+                signal.raise_signal(signal.SIGINT)
+        return np.column_stack([X[:, 0], 1 - X[:, 0]])
+
+    front = MACS().minimize(function, [(0, 1)] * 2, evaluations=10_000, seed=1, progress=False)
+    assert len(front) and front.stats["stopped"] == "interrupted" and front.stats["evaluations"] < len(seen)
+
+
 def test_a_part_ends_with_the_whole():
     with Interrupts(LIMIT), within(BOUND):
         front = MACS().minimize(lambda X: np.column_stack([X[:, 0], 1 - X[:, 0]]), [(0, 1)] * 2, evaluations=10**9, seed=1)

@@ -184,3 +184,17 @@ def test_a_masked_value_is_a_failed_evaluation(as_list):
     result = box.evaluate(np.array([[0.0], [0.5], [1.0]]))
     assert result.status.tolist() == ["converged", "failed", "failed"]
     assert np.isnan(result.F[1:]).all()
+
+
+def test_an_error_of_the_function_says_at_which_row(caplog):
+    def function(X):
+        if (X[:, 0] > 0.8).any():
+            raise ArithmeticError("too large")
+        return two(X)
+
+    with pytest.raises(ArithmeticError, match="too large"):
+        boxed(function, {"height": (0, 1), "width": (0, 1)}).evaluate(np.array([[0.1, 0.2], [0.9, 0.3], [0.95, 0.4]]))
+    assert caplog.messages == ["the function raised ArithmeticError at height = 0.9, width = 0.3"]
+    with pytest.raises(ValueError, match="shape"):
+        boxed(lambda X: X[:1], [(0, 1)]).evaluate(np.zeros((3, 1)))
+    assert len(caplog.messages) == 1, "what it returned is no error of its own"

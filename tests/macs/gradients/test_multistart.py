@@ -125,7 +125,7 @@ def test_the_deepest_of_eight_wells_is_found(deepest):
     depths = [1.0 + (2.0 if k == deepest else 0.1 * (k % 3)) for k in range(8)]
     point = optimize(wells(depths), DFET(1, 1))
     assert point.parameters["p"] == pytest.approx((deepest + 0.5) / 8, abs=1e-2)
-    stats = point.alone().stats
+    stats = point.stats
     assert stats["starts"] > stats["optima"] >= 3 and stats["found"] >= 1
 
 
@@ -140,6 +140,14 @@ def test_what_only_one_start_found_is_said():
         assert front.stats["starts"]["height"] >= front.stats["optima"]["height"] >= 1
         seen.add(once)
     assert seen == {True, False}
+
+
+@pytest.mark.parametrize("method", [None, DFET(1, 1)])
+def test_an_optimum_says_so_too(method):
+    for depths in ([1.0, 3.0, 1.0, 1.0], [3.0]):
+        point = optimize(wells(depths, width=0.004 if len(depths) > 1 else 1.0), method, objective="height")
+        assert ("one start alone found" in point.message) == (point.stats["found"] == 1 < point.stats["starts"])
+    assert not point.message
 
 
 @pytest.mark.slow
