@@ -14,7 +14,7 @@ from contextvars import ContextVar, Token
 from types import TracebackType
 from typing import Any, Self, TextIO
 
-from .interrupts import Interrupts, numbers_may_blow_up
+from .interrupts import Interrupts, work_on_trajectories
 
 LINE_EVERY = 10.0
 """Seconds between plain lines."""
@@ -165,7 +165,7 @@ class Steps(StatusLine):
 @contextmanager
 def working(time_limit: float | None, progress: bool | None) -> Iterator[tuple[StatusLine, Interrupts]]:
     """A context of long work: its status line, and its interrupts. Ctrl-C and the time limit ask it to end (`transcription.stopping`)."""
-    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, numbers_may_blow_up():
+    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, work_on_trajectories():
         yield status, interrupts
 
 

@@ -6,14 +6,16 @@ import os
 import signal
 import threading
 import time
-from contextlib import AbstractContextManager, ExitStack
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from types import FrameType, TracebackType
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_by
 
-__all__ = ["Interrupts", "Stopped", "numbers_may_blow_up"]
+__all__ = ["Interrupts", "Stopped", "work_on_trajectories"]
 
 
 class Interrupts(AbstractContextManager["Interrupts"]):
@@ -81,7 +83,9 @@ class Interrupts(AbstractContextManager["Interrupts"]):
             self._whole._interrupt(number, frame)
 
 
-def numbers_may_blow_up() -> np.errstate:
-    """A context of work on trajectories, some of which are far from feasible: statuses and violations say what is no number there, and
-    warnings of numpy would add nothing."""
-    return np.errstate(over="ignore", invalid="ignore", divide="ignore")
+@contextmanager
+def work_on_trajectories() -> Iterator[None]:
+    """A context of work on trajectories. Some are far from feasible: statuses and violations say what is no number there, and warnings of
+    numpy would add nothing. Matrices are small: more threads of BLAS than one would cost time, and make last digits those of a machine."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), threadpool_limits(1, user_api="blas"):
+        yield

@@ -29,7 +29,7 @@ from ..fronts.builders import from_archive, from_vector_problem, no_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine
-from ..io.interrupts import Interrupts, numbers_may_blow_up
+from ..io.interrupts import Interrupts, work_on_trajectories
 from ..refinement.mesh_search import search_meshes
 from .method import SearchMethod
 from .progress import Progress
@@ -176,7 +176,7 @@ class Solver(SearchMethod):
         check_start(start, compiled)
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
         earlier, chosen = Counts(), None
-        with Interrupts(call.time_limit) as interrupts, numbers_may_blow_up():
+        with Interrupts(call.time_limit) as interrupts, work_on_trajectories():
             try:
                 if transcription is None:
                     with StatusLine(call.progress) as show:

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from compiled_cases import compiled
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from macs import MACS, MOPSO, NSGA2, Progress, sweep
 from macs.evaluation.evaluator import Counts
@@ -227,3 +228,15 @@ def test_what_blows_up_in_a_search_is_no_warning():
             front = MACS(agents=4, archive=4).solve(problem, SingleShooting(8), evaluations=40, seed=1, inner=inner)
             assert front.message
         sweep(problem, DFET(3, 2), points=3, starts=1)
+
+
+def test_work_on_trajectories_takes_one_thread_of_blas():
+    def threads() -> set[int]:
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    during: list[set[int]] = []
+    with threadpool_limits(2, user_api="blas"):
+        MACS(agents=3, archive=4).solve(
+            compiled("goddard"), DFET(2, 2), evaluations=20, seed=1, verify=None, callback=lambda progress: during.append(threads())
+        )
+        assert threads() == {2} and during and all(one == {1} for one in during)
