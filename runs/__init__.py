@@ -16,4 +16,9 @@ def __getattr__(name: str) -> Any:
     # The command line lives here too: its help must not wait for numbers.
     if name not in __all__:
         raise AttributeError(f"module 'runs' has no attribute '{name}'")
+    import_module("macs")  # it finds the other floors
     return getattr(import_module(".study" if name == "Study" else ".measures.indicators", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

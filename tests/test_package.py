@@ -1,6 +1,9 @@
 """What is installed: all data files of the packages, and other packages that suit every Python we promise. `make package` builds the wheel
 and tries it."""
 
+import os
+import subprocess
+import sys
 import tomllib
 from fnmatch import fnmatch
 from importlib.metadata import distributions
@@ -10,6 +13,8 @@ from package import FLOORS, LEFT_OUT, missing
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
+
+import runs
 
 ROOT = Path(__file__).parents[1]
 
@@ -44,3 +49,21 @@ def test_what_is_pinned_suits_the_least_python():
     needs = {canonicalize_name(one.metadata["Name"]): one.metadata.get("Requires-Python", "") for one in distributions()}
     pinned = {canonicalize_name(one.name) for one in pins} & needs.keys()
     assert len(pinned) > 50 and [name for name in sorted(pinned) if "3.11.0" not in SpecifierSet(needs[name])] == []
+
+
+def test_the_floors_find_each_other_whatever_lies_beside_the_script(tmp_path):
+    (tmp_path / "problems.py").write_text("mine = 1")
+    (tmp_path / "transcription.py").write_text("mine = 1")
+
+    def said(text: str) -> str:
+        (tmp_path / "script.py").write_text(text)
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        return subprocess.run([sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True).stderr
+
+    assert not said("from macs import MACS\nfrom problems import Problem\nfrom transcription import DFET")
+    line = said("from problems import mine\nimport macs").splitlines()[-1]
+    assert line.startswith("ImportError: ") and f"{tmp_path / 'problems.py'} hides" in line and "rename" in line
+
+
+def test_what_runs_has_is_listed():
+    assert {"Study", "hypervolume"} <= {*dir(runs)}

@@ -40,7 +40,8 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB
 
 def start(module: str, *arguments: str, **streams: Any) -> subprocess.Popen[Any]:
     """A process of a module's own main, which leads a group of its own."""
-    places = os.pathsep.join(place or str(Path.cwd()) for place in sys.path)
+    own = str(Path(__file__).parents[2])  # first, whatever lies beside the user's script
+    places = os.pathsep.join(place or str(Path.cwd()) for place in (own, *sys.path))
     env = {**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": places}
     return subprocess.Popen([sys.executable, "-m", module, *arguments], env=env, start_new_session=True, **streams)
 
