@@ -194,10 +194,19 @@ class TaskOptima:
         self.all: list[MeshedOptimum] = []
         self._units = np.full(len(task.weights), np.inf)
 
-    def add(self, method: Meshed, nlp: NLP, solved: Solved, rule: MultistartStopping, ends: Sequence[np.ndarray] = ()) -> None:
-        """Refine the result of a solve on a coarse mesh if it converged; `ends` are the objectives (m,) of the other ends of a front."""
+    def add(
+        self,
+        method: Meshed,
+        nlp: NLP,
+        solved: Solved,
+        rule: MultistartStopping,
+        ends: Sequence[np.ndarray] = (),
+        alpha: float | None = None,
+    ) -> None:
+        """Refine the result of a solve on a coarse mesh if it converged; `ends` are the objectives (m,) of the other ends of a front, and
+        `alpha` is what the optimum is where the starts of the rule were made, if that is elsewhere."""
         loop = self.loop
-        one = MeshedOptimum(method, nlp, solved, rule, self.task.loss(solved.F))
+        one = MeshedOptimum(method, nlp, solved, rule, self.task.loss(solved.F) if alpha is None else alpha)
         if solved.status == CONVERGED:
             # Objectives that are large only where an attempt is poor are not to be judged by that.
             self._units = units = np.minimum(self._units, loop.units(np.array([solved.F, *ends]), nlp, solved.z))
@@ -236,6 +245,7 @@ class MeshSearch:
         self._given, self._starts, self._rng, self._ends = given, starts, rng, ends
         self.solvers: dict[Meshed, MultistartSolver] = {}
         self._explored: list[set[Meshed]] = [set() for _ in tasks]
+        self._others = list[Solved]()  # what other starts led to
         self.exhausted, self._hopeless, self._begun = False, 0, False
 
     def go(self, coarse: Sequence[Meshed]) -> None:
@@ -291,7 +301,8 @@ class MeshSearch:
                 return solved
             self._explored[i].add(method)
             work = WORK.little * (SEARCH.starts if self._ends else 1.0)
-            return solver.drawn(solved, optima.task, rule, min(work, self.loop.left))[0]
+            solved, self._others = solver.drawn(solved, optima.task, rule, min(work, self.loop.left))
+            return solved
 
         best = lexicographic_ends(solver, single) if self._ends else [single(0)]
         self._hopeless += solver.closest is not None
@@ -310,8 +321,9 @@ class MeshSearch:
                 optima.add(method, nlp, one, rule)
 
     def _elsewhere(self, i: int) -> None:
-        """Solve from the best optimum and other starts on an even mesh as fine as its own, if that takes little work, and refine results
-        that are better than it or, if it is not good, different from it: on a coarse mesh good optima may be hidden among spurious ones."""
+        """Solve from the best optimum, other optima of the coarse mesh and other starts on an even mesh as fine as its own, if that takes
+        little work, and refine results that are better than it or, if it is not good, different from it: on a coarse mesh good optima may
+        be hidden among spurious ones."""
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
         best, task, budget = optima.best, optima.task, max(SEARCH.share * before, WORK.little)
         if best.refinement is None or loop.ended:
@@ -319,22 +331,32 @@ class MeshSearch:
         present = best.refinement.best
         method = even(present.method)
         nlp, rule, found = loop.programs(method), MultistartStopping(), list[Solved]()
+
+        def different(solved: Sequence[Solved], most: float) -> list[Solved]:
+            """Those that converged, are no worse than `most` and differ from the best optimum and from each other, in their order."""
+            seen, kept = [best.loss], list[Solved]()
+            for one in sorted(solved, key=task.rank):
+                loss = task.loss(one.F)
+                if one.status == CONVERGED and loss < most and all(abs(loss - other) > SEARCH.clearly * best.unit for other in seen):
+                    seen, kept = [*seen, loss], [*kept, one]
+            return kept
+
         solver = self.solvers.setdefault(method, MultistartSolver(nlp, None, 1, self._rng, loop.solves))
         with suppress(Stopped):
-            with loop.solves.at_most(MULTISTART.iterations):
-                known = solver.from_vector(nlp.interpolate(present.trajectory), task)
-            rule.add(task.optimum(known))
-            found = [known, *solver.drawn(known, task, rule, min(before + budget - loop.work, loop.left))[1]]
-        seen, promising = [best.loss], list[Solved]()
-        for solved in sorted(found, key=task.rank):
-            loss = task.loss(solved.F)
-            if solved.status == CONVERGED and all(abs(loss - other) > SEARCH.clearly * best.unit for other in seen):
-                seen.append(loss)
-                promising += [solved] if loss < best.loss or not best.good else []
+            coarse = self.solvers[best.method].nlp
+            begun = [present.trajectory, *(coarse.unpack(other.z) for other in different(self._others, np.inf))]
+            for trajectory in begun:
+                if loop.work < before + budget and not loop.ended:
+                    with loop.solves.at_most(MULTISTART.iterations):
+                        found.append(solver.from_vector(nlp.interpolate(trajectory), task))
+                    rule.add(task.optimum(found[-1]))
+            found += solver.drawn(min(found, key=task.rank), task, rule, min(before + budget - loop.work, loop.left))[1]
+        promising = different(found, best.loss if best.good else np.inf)
         with loop.at_most(budget):
             for solved in promising[: SEARCH.refined]:
                 if not loop.ended:
-                    optima.add(method, nlp, solved, rule)
+                    own = solved is found[0]  # the same optimum on this mesh
+                    optima.add(method, nlp, solved, best.rule if own else rule, alpha=best.alpha if own else None)
 
 
 def even(method: Meshed) -> Meshed:
