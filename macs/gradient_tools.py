@@ -36,7 +36,7 @@ from .gradients.ends import ENDS, METHODS, check_points, lexicographic_ends, sol
 from .gradients.multistart import MultistartSolver, MultistartStopping
 from .gradients.scalarised import MOST_ITERATIONS, WEAK, WORK, GradientSolves, Scalarised
 from .io.console import working
-from .pareto.dominance import BETTER, distinct
+from .pareto.dominance import BETTER, distinct, separate
 from .refinement.mending import mended, resolve_unverified
 from .refinement.mesh_loop import MeshLoop, Programs
 from .refinement.mesh_search import SEARCH, MeshSearch, coarse_meshes, search_meshes
@@ -392,6 +392,7 @@ class _Job:
         F = np.array([solved.F for solved in good])
         # Rounded to the accuracy of the solves: otherwise one of two equal points might dominate the other.
         kept = distinct(F, self._unit(ranges))
+        kept[kept] = separate(F[kept], self._unit(ranges))
         left = {"did not converge": len(found) - len(good), "dominated or equal": int(np.count_nonzero(~kept))}
         message = ", ".join(f"{count} {word}" for word, count in left.items() if count)
         chosen = [solved for solved, keep in zip(good, kept, strict=True) if keep]

@@ -15,7 +15,7 @@ from transcription.stopping import stopping
 from ..evaluation.evaluator import CONVERGED
 from ..pareto.directions import divisions_below, simplex_lattice
 from .multistart import MULTISTART, MultistartSolver
-from .scalarised import END, WEAK, WORK, Scalarised, without_loss
+from .scalarised import END, WEAK, WORK, Scalarised, strongly_optimal, without_loss
 
 METHODS = ("pascoletti-serafini", "epsilon")
 """Scalarisations of a sweep."""
@@ -130,6 +130,12 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
         limit = solver.solves.counts.work + max(WORK.little, solver.solves.counts.work - before)
         while _from_other_starts(solver, tasks, found, limit):
             _from_rivals(solver, tasks, found)
+    good = [solved for solved in found if solved.status == CONVERGED]
+    ranges = np.ptp([solved.F for solved in good], axis=0) if good else np.zeros(0)
+    with solver.solves.at_most(END.ties):
+        for k, solved in enumerate(found):
+            if solved.status == CONVERGED and solved.multipliers is not None:
+                found[k] = strongly_optimal(solver.from_vector, solved, solved.multipliers[: len(ranges)], ranges)
     return found
 
 

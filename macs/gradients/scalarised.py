@@ -90,6 +90,7 @@ class EndLimits:
     close: float = 1e-3  # violation up to which a start on another mesh is nearly the end itself
     ties: int = 150  # most iterations of a solve that is to improve the others
     slack: float = 1e-5  # part of an objective's range that may be lost where the others cannot be improved without any loss
+    weightless: float = 1e-4  # share of an objective in the sum that a point minimises up to which it has no weight
     unsure: float = 0.2  # part of what a slack is worth, as its multipliers say, that is not known
 
 
@@ -133,6 +134,20 @@ def without_loss(
     if exact.status != CONVERGED:
         return best
     return exact if task.alpha(exact.F) < task.alpha(end.F) else end
+
+
+def strongly_optimal(
+    solve: Callable[[np.ndarray, Scalarised, bool], Solved], point: Solved, weights: np.ndarray, ranges: np.ndarray
+) -> Solved:
+    """A point, or a better one: a point that is optimal with a positive weight (m,) on every objective is Pareto optimal; of another, the
+    objectives without weight are minimised once, the others kept. ranges (m,)."""
+    sizes = weights * ranges
+    left = (sizes <= END.weightless * sizes.sum()) & (ranges > 0)
+    if not left.any() or left.all():
+        return point
+    task = Scalarised(np.where(left, point.F, np.inf), ranges, np.where(left, np.inf, point.F))
+    found = without_loss(solve, point, task, END.slack * ranges)
+    return found if found.message != WEAK else point
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,6 +72,8 @@ SAME = 1e-7
 """Objectives that differ by less than this part of their ranges are equal."""
 BETTER = 1e-6
 """An objective that is lower by this part of its range is clearly better."""
+APART = 0.01
+"""Least distance of the points of a front, in the distance of so many that are evenly spread over the range of an objective."""
 CONSTANT = 1e-6
 """An objective that varies less, as a fraction of its size, is judged by its size."""
 
@@ -122,3 +124,13 @@ def distinct(F: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     """Mask (n,) of the non-dominated rows of F (n, m), with objectives rounded to `SAME` of their ranges (m,): of two points that differ
     less, only the first is kept."""
     return nondominated(np.round((F - F.min(axis=0)) / ranges / SAME))
+
+
+def separate(F: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Mask (n,) of points F (n, m) of which each differs from every other in some objective by more than `APART`, the best of each
+    objective before others. ranges (m,)."""
+    kept, least = list[int](), APART / max(len(F), 1)
+    for i in dict.fromkeys([*extremes(F).tolist(), *range(len(F))] if len(F) else []):
+        if all((np.abs(F[i] - F[j]) > least * ranges).any() for j in kept):
+            kept.append(i)
+    return np.isin(np.arange(len(F)), kept)

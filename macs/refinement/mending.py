@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -11,18 +12,19 @@ from transcription import from_dict
 from transcription.inner import Propagate
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
+from transcription.nlp.scalarized import Solved
 from transcription.stopping import stopping
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import best_rows, from_vectors
+from ..fronts.builders import best_rows, certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, verified
 from ..gradients.front_polish import KEPT_INSIDE, back_off
-from ..gradients.scalarised import WORK, GradientSolves, Scalarised
+from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal
 from ..io.console import working
-from ..pareto.dominance import extremes
+from ..pareto.dominance import extremes, separate
 from ..pareto.spread import Guide, spread
 from .front_refinement import FrontRefinement
 from .mesh_loop import OnMesh, Programs, differentiable
@@ -63,11 +65,11 @@ def mended(
     with working(time_limit, progress) as (show, interrupts):
         job = _Mending(points, verify, show)
         again = job.resolve_unverified(fine)
-        joined = again if ends is None else job.with_ends(again, ends)
+        joined = job.strong(again if ends is None else job.with_ends(again, ends))
         if joined is job.points and joined.verified.all():
-            return joined[best_rows(joined)].sorted()
+            return _separate(joined[best_rows(joined)]).sorted()
         # The ranges of the objectives may be others now.
-        kept = job.marked(joined[best_rows(joined, verify * objective_scales(joined))])
+        kept = job.marked(_separate(joined[best_rows(joined, verify * objective_scales(joined))]))
         if joined is not job.points:
             kept = job.marked(job.fill_gaps(kept, len(points), guide))
         return job.with_costs(job.with_reasons(kept.sorted()), interrupts.elapsed, interrupts.reason)
@@ -152,7 +154,7 @@ class _Mending:
             found = (self._solved(points, int(row), Scalarised(target, scales, units=scales)) for row in rows[near])
             if (new := next((one for one in found if one is not None), None)) is not None:
                 joined = Points.concatenate([points, new]).replace(stats=points.stats, solver=points.solver)
-                points = joined[best_rows(joined)]
+                points = _separate(joined[best_rows(joined)])
         return points[_within(points, size, guide)]
 
     def _solved(self, points: Points, row: int, task: Scalarised) -> Points | None:
@@ -166,6 +168,30 @@ class _Mending:
         found = from_vectors(nlp, solved.z[None], points.solver, points.stats)
         found = verified(found, self.verify, task.weights, remark=False, simulations=self.simulations)
         return found if found.verified[0] else None
+
+    def strong(self, points: Points) -> Points:
+        """The points, with a better one in place of each verified one that is only weakly optimal: of each that is not optimal with a
+        weight on every objective, the objectives without are minimised once. `points` itself if none is better."""
+        m, scales, better = points.F.shape[1], objective_scales(points), dict[int, Points]()
+        best = extremes(points.F) if len(points) else np.zeros(0)
+        for i in self._meshed(points, points.verified) if m > 1 and differentiable(self.programs.problem) else ():
+            own = points[i].weights
+            weights = (best == i).astype(float) if own is None else np.array(list(own.values()))
+            if not (weights > 0).any() or stopping():
+                continue
+            nlp = self.programs(from_dict(points[i].transcription or {}))
+            point = Solved(points[i].decision, points[i].F, points[i].violation, CONVERGED, 0)
+            with self._solves.at_most(MENDING.patience):
+                found = strongly_optimal(partial(self._solves, nlp), point, weights, scales)
+            if found is not point:
+                certificate = certified(nlp, found.z[None], scales)
+                new = self.marked(from_vectors(nlp, found.z[None], points.solver, points.stats, **certificate))
+                better |= {i: new} if new.verified[0] else {}
+        if not better:
+            return points
+        return Points.concatenate([better.get(i, points[[i]]) for i in range(len(points))]).replace(
+            stats=points.stats, solver=points.solver
+        )
 
     def _as_before(self, points: Points) -> Points:
         """The points, with the original in place of each that was verified originally and no longer is."""
@@ -240,6 +266,12 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: flo
     if not moved:
         return points
     return Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats, solver=points.solver)
+
+
+def _separate(points: Points) -> Points:
+    """The points without those in the same place as another; see `separate`."""
+    seen = np.where(points.verified[:, None], points.simulated_F, points.F)
+    return points[np.flatnonzero(separate(seen, objective_scales(points)))] if len(points) else points
 
 
 def _within(points: Points, size: int, guide: Guide | None) -> np.ndarray:

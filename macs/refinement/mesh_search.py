@@ -23,6 +23,7 @@ from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import Solved
 from transcription.phases.mesh import PhaseMesh
 from transcription.stopping import Stopped
+from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import certified, from_vectors
@@ -245,7 +246,7 @@ class MeshSearch:
         self._given, self._starts, self._rng, self._ends = given, starts, rng, ends
         self.solvers: dict[Meshed, MultistartSolver] = {}
         self._explored: list[set[Meshed]] = [set() for _ in tasks]
-        self._others = list[Solved]()  # what other starts led to
+        self._others: list[tuple[Callable[[np.ndarray], Trajectory], list[Solved]]] = []  # what other starts on coarse meshes led to
         self.exhausted, self._hopeless, self._begun = False, 0, False
 
     def go(self, coarse: Sequence[Meshed]) -> None:
@@ -301,7 +302,8 @@ class MeshSearch:
                 return solved
             self._explored[i].add(method)
             work = WORK.little * (SEARCH.starts if self._ends else 1.0)
-            solved, self._others = solver.drawn(solved, optima.task, rule, min(work, self.loop.left))
+            solved, others = solver.drawn(solved, optima.task, rule, min(work, self.loop.left))
+            self._others.append((nlp.unpack, others))
             return solved
 
         best = lexicographic_ends(solver, single) if self._ends else [single(0)]
@@ -325,12 +327,12 @@ class MeshSearch:
         little work, and refine results that are better than it or, if it is not good, different from it: on a coarse mesh good optima may
         be hidden among spurious ones."""
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
-        best, task, budget = optima.best, optima.task, max(SEARCH.share * before, WORK.little)
+        best, task, budget, found = optima.best, optima.task, max(SEARCH.share * before, WORK.little), list[Solved]()
         if best.refinement is None or loop.ended:
             return
         present = best.refinement.best
         method = even(present.method)
-        nlp, rule, found = loop.programs(method), MultistartStopping(), list[Solved]()
+        nlp, rule = loop.programs(method), MultistartStopping()
 
         def different(solved: Sequence[Solved], most: float) -> list[Solved]:
             """Those that converged, are no worse than `most` and differ from the best optimum and from each other, in their order."""
@@ -343,14 +345,18 @@ class MeshSearch:
 
         solver = self.solvers.setdefault(method, MultistartSolver(nlp, None, 1, self._rng, loop.solves))
         with suppress(Stopped):
-            coarse = self.solvers[best.method].nlp
-            begun = [present.trajectory, *(coarse.unpack(other.z) for other in different(self._others, np.inf))]
+            begun = [present.trajectory, *(unpack(other.z) for unpack, others in self._others for other in different(others, np.inf))]
             for trajectory in begun:
                 if loop.work < before + budget and not loop.ended:
                     with loop.solves.at_most(MULTISTART.iterations):
                         found.append(solver.from_vector(nlp.interpolate(trajectory), task))
                     rule.add(task.optimum(found[-1]))
             found += solver.drawn(min(found, key=task.rank), task, rule, min(before + budget - loop.work, loop.left))[1]
+        if rule.starts > best.rule.starts and found:
+            # On the mesh from which the best came no other starts were made.
+            known = best.solved
+            best = replace(best, rule=rule, alpha=task.loss(found[0].F))
+            optima.all = [replace(one, rule=rule, alpha=best.alpha) if one.solved is known else one for one in optima.all]
         promising = different(found, best.loss if best.good else np.inf)
         with loop.at_most(budget):
             for solved in promising[: SEARCH.refined]:

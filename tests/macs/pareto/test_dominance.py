@@ -6,6 +6,7 @@ from hypothesis.extra.numpy import arrays
 
 from macs.evaluation.evaluator import CONVERGED, INFEASIBLE, Evaluation
 from macs.pareto.dominance import (
+    APART,
     alpha_nondominated,
     constrained_dominates,
     distinct,
@@ -16,6 +17,7 @@ from macs.pareto.dominance import (
     nondominated,
     normalised,
     ranges,
+    separate,
     slack,
 )
 
@@ -132,3 +134,12 @@ def test_ranges_neighbours_normalised_values_and_points_that_differ_by_rounding(
     F = np.array([[0.0, 10.0], [1e-9, 10.0 - 1e-8], [0.5, 5.0], [1.0, 0.0], [0.6, 5.5]])
     assert distinct(F, np.array([1.0, 10.0])).tolist() == [True, False, True, True, False]
     assert distinct(F, np.array([1e-3, 1e-2])).tolist() == [True, True, True, True, False]
+
+
+@given(FRONTS, st.floats(0.1, 300.0))
+def test_points_in_different_places(F, width):
+    """Each point that is left out has one in its place, no two of the others are in one place, and the best of each objective are there."""
+    kept, least = separate(F, np.full(F.shape[1], width)), APART * width / len(F)
+    apart = np.abs(F[:, None] - F).max(axis=2) > least
+    assert (~apart[:, kept]).any(axis=1).all() and (apart | np.eye(len(F), dtype=bool))[np.ix_(kept, kept)].all()
+    assert (F[kept].min(axis=0) == F.min(axis=0)).all() and separate(F[:0], np.ones(F.shape[1])).shape == (0,)

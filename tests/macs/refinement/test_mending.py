@@ -5,6 +5,7 @@ import pytest
 from smooth_problems import bryson_denham, time_against_effort
 
 from macs import MACS, NSGA2, Front, payoff, sweep
+from macs.fronts.builders import certified, from_vectors
 from macs.fronts.verified import unmarked
 from macs.gradients.front_polish import KEPT_INSIDE
 from macs.refinement import mending
@@ -157,3 +158,23 @@ def test_a_fine_mesh_is_for_all_points():
     assert (np.abs(found.F - front.F) / np.ptp(front.F, axis=0)).max() < 0.15, "less than the distance of neighbours"
     with stopped_by(lambda: True):
         assert mending.mended(front, 1e-3, fine=DFET(4, 3)).trajectories == front.trajectories
+
+
+def test_what_a_point_wastes_without_any_effect_on_its_own_objective_is_saved():
+    """The least time, at its bound, with a parameter that only costs: on the way to 1 in a time T the least effort is 1 / T."""
+    problem = Problem("waste")
+    run = problem.phase("run", t0=0.0, tf=(1.0, 2.0))
+    x, p = run.state("x", bounds=(-2, 2), initial=0, final=1), problem.parameter("p", bounds=(-1, 1))
+    u = run.control("u", bounds=(-3, 3))
+    run.dynamics(x=u + 0.0 * x)
+    problem.minimize("time", run.tf)
+    problem.minimize("cost", run.integral(u**2) + p**2)
+    front = sweep(problem, DFET(2, 2), points=3, starts=1)
+    nlp = DFET(2, 2).nlp(problem.compile())
+    Z = np.array([point.decision for point in front])
+    Z[0, [v.name for v in nlp.variables].index("p")] = 0.7
+    wasteful = from_vectors(nlp, Z, front.solver, front.stats, **certified(nlp, Z, np.ptp(front.F, axis=0)))
+    assert wasteful.F[0] == pytest.approx([1.0, 1.49], abs=1e-6) and wasteful[0].optimality < 1e-6, "it is weakly optimal"
+    found = mending.mended(wasteful, 1e-3)
+    assert found.verified.all() and pytest.approx(front.F, abs=1e-4) == found.F
+    assert found.stats["gradient_solves"] <= wasteful.stats["gradient_solves"] + 4, "at most two solves for each end"
