@@ -42,9 +42,8 @@ class MultistartLimits:
     unseen: float = 0.005  # probability that another start would find another optimum below which there are enough
     fewest: int = 8  # solves after which none has converged that are enough
     many: int = 60  # where optima are many: solves that are enough, if there are also `last` times as many as it took to find the best
-    last: int = 2
+    last: int = 2  # also the multiple of the work for starts where the best of several optima was found once: that is no proof
     most: int = 200
-    once: float = 2.0  # multiple of the work for starts where the best of several optima was found once: that is no proof
     same: float = 1e-3  # losses that differ by less are of one optimum: as a part of the differences between all optima,
     rounding: float = 1e-5  # and of their size
 
@@ -247,7 +246,7 @@ class MultistartSolver:
                 stopping_rule.enough
                 or self.closest
                 or self.drawn_enough
-                or self.solves.counts.work - before >= work * (MULTISTART.once if stopping_rule.found_once else 1.0)
+                or self.solves.counts.work - before >= work * (MULTISTART.last if stopping_rule.found_once else 1)
                 or stopping()
                 or self.is_least(best, task)
             ):

@@ -76,7 +76,7 @@ def test_starts_are_sought_longer_where_the_best_of_several_was_found_once(monke
         best = drawn(None)
         rule.add(best.F[0])
         counted.append(len(solver.drawn(best, Scalarised.single(0, 2), rule, 10.0)[1]))
-    assert counted == [10 * MULTISTART.once, 10]
+    assert counted == [10 * MULTISTART.last, 10]
 
 
 def test_solves_for_times_at_their_bounds():
