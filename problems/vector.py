@@ -215,6 +215,8 @@ class VectorProblem:
         lower, upper = checks.interval(bounds, f"the bounds of {what}")
         if lower == upper:
             raise ValueError(f"the bounds of {what} leave nothing to decide: {lower:g} on both sides")
+        if not math.isfinite(upper - lower):
+            raise ValueError(f"the bounds of {what}, ({lower:g}, {upper:g}), are too far apart")
         length = checks.period(period, (lower, upper), what)
         self._variables[name] = Variable(name, lower, upper, checks.unit(unit, what), upper - lower, length)
 

@@ -212,11 +212,19 @@ def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
     """`stats` from its attributes. Raises ValueError for what it cannot be."""
     stats = {**read_document(attrs, "stats"), "versions": read_document(attrs, "versions")}
     stats |= {name: bool(attrs[name]) if isinstance(usual, bool) else attrs[name] for name, usual in STATS.items() if name in attrs}
+    stats |= {name: _whole(stats[name]) for name in (*COUNTED, "failures", "seed") if name in stats}
     try:
         msgspec.convert(stats, Stats)
     except msgspec.ValidationError as error:
         raise ValueError(f"its 'stats' are not what they should be: {error}") from error
     return stats
+
+
+def _whole(value: Any) -> Any:
+    """Counts as whole numbers, where another program has written them as 10.0; all else as it is."""
+    if isinstance(value, dict):
+        return {name: _whole(one) for name, one in value.items()}
+    return int(value) if isinstance(value, float | np.floating) and float(value).is_integer() else value
 
 
 def read_source(attrs: Mapping[str, Any]) -> ProblemSource | None:

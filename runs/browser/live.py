@@ -61,6 +61,10 @@ class Readings:
             self._known[paths] = stamps, make()
         return self._known[paths][1]
 
+    def forget(self) -> None:
+        """Forget what was made of files that are gone."""
+        self._known = {paths: one for paths, one in self._known.items() if any(map(_stat, paths))}
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -138,6 +142,7 @@ class FollowedFronts(Followed):
                 if self._single:
                     raise
                 unreadable.append(f"{path.name} cannot be read now: {_line(error)}")
+        self._readings.forget()
         groups: dict[Any, dict[Path, Front]] = {}
         for path, front in fronts.items():
             groups.setdefault((problem_name(front), tuple(front.goals)), {})[path] = front
@@ -178,12 +183,12 @@ class FollowedStore(Store):
 
     def __init__(self, path: Path, definition: Mapping[str, Any], trust: bool = False) -> None:
         super().__init__(path, definition, trust)
-        self._runs = Readings()
+        self.readings = Readings()
 
     def run(self, cell: Cell, number: int) -> StoredRun:
         """One run."""
         front = self.front_path(cell, number)
-        return self._runs.of(lambda: super(FollowedStore, self).run(cell, number), front, front.with_suffix(".json"))
+        return self.readings.of(lambda: super(FollowedStore, self).run(cell, number), front, front.with_suffix(".json"))
 
 
 @dataclass(frozen=True)
@@ -220,6 +225,8 @@ class FollowedStudy(Followed):
         self._store = store
         summary, progress = store.summary(), read_progress(store.path)
         shown, unreadable = self._read(summary)
+        self._shown.forget()
+        store.readings.forget()
         going = _going(summary, progress)
         found = self._comparisons(shown)
         data = {"title": summary.name, "kind": "study", "failures": failures_data(summary), "unreadable": unreadable}

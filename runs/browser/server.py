@@ -43,6 +43,7 @@ class Server(ThreadingHTTPServer):
     """A server of one page."""
 
     daemon_threads = True
+    request_queue_size = 1024  # connections that wait to be answered: a browser with many pages opens them at once
 
     def __init__(self, followed: Followed, host: str = "127.0.0.1", port: int = 0) -> None:
         self.followed, self.page = followed, live_page(followed.title)
@@ -88,7 +89,10 @@ class Handler(BaseHTTPRequestHandler):
         if self.server.local and not _is_local(self.headers.get("Host", "")):
             self._send(HTTPStatus.FORBIDDEN, "text/plain", f"This server only answers at {self.server.url}\n".encode())
             return
-        found = self._found(urlsplit(self.path).path)
+        try:
+            found = self._found(urlsplit(self.path).path)
+        except ValueError:  # it is no address
+            found = None
         if found is None:
             self._send(HTTPStatus.NOT_FOUND, "text/plain", b"There is no such page.\n")
             return

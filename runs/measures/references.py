@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import importlib
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from problems.vector import CompiledVectorProblem
 
 
+FILES = (".nc", ".csv", ".tsv", ".txt", ".dat", ".pf")
+"""Suffixes of files that are references whether they are there or not."""
 ReferenceKey = Annotated[
     str | dict[str, str] | None,
     Meta(description="'union', 'truth', the name of a case, a file, or one of these by problem"),
@@ -107,7 +109,7 @@ def called(case: str) -> tuple[str, bool]:
 
 
 def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
-    """A front from a file: a saved one (.nc), or a table of objectives (.csv), such as `Front.to_csv` or another program writes."""
+    """A front from a file: a saved one (.nc), or a table of objectives, such as `Front.to_csv` or `numpy.savetxt` writes."""
     if Path(path).suffix.lower() == ".nc":
         front = Front.load(path)
         if goals and front.goals != tuple(goals):
@@ -115,7 +117,7 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
         return front
     if not goals:
         raise ValueError(f"'{path}' is a table: to read it, state the objectives that it is of")
-    lines = [(i, [cell.strip() for cell in row]) for i, row in enumerate(_table(path), 1) if any(cell.strip() for cell in row)]
+    lines = list(_content(_table(path), goals))
     if not lines:
         raise ValueError(f"'{path}' is empty")
     headed = not _is_number(lines[0][1][0])
@@ -135,9 +137,16 @@ def read(path: str | PathLike[str], goals: Sequence[Objective] = ()) -> Front:
 
 
 def _table(path: str | PathLike[str]) -> list[list[str]]:
-    """The rows of a CSV file. Raises what `read` says."""
+    """The rows of a table with commas, semicolons, tabulators or blanks between its columns. Raises what `read` says."""
     try:
-        return list(csv.reader(io.StringIO(read_whole(path, DATA_BYTES).decode("utf-8-sig"), newline="")))
+        text = read_whole(path, DATA_BYTES).decode("utf-8-sig")
+        first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+        mark = next((mark for mark in ";\t," if mark in first), None)
+        if mark is None:
+            return [line.split() for line in text.splitlines()]
+        rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=mark))
+        # Beside semicolons, commas stand for the points of numbers.
+        return [[point if _is_number(point := cell.replace(",", ".")) else cell for cell in row] for row in rows] if mark == ";" else rows
     except FileNotFoundError:
         raise FileNotFoundError(f"there is no file '{path}'") from None
     except OSError as error:
@@ -146,11 +155,28 @@ def _table(path: str | PathLike[str]) -> list[list[str]]:
         raise ValueError(f"'{path}' is no table: {error}") from error
 
 
+def _content(rows: Sequence[Sequence[str]], goals: Sequence[Objective]) -> Iterator[tuple[int, list[str]]]:
+    """Numbers and cells of the rows that are neither empty nor a comment; one that names all objectives is a header."""
+    for number, row in enumerate(rows, 1):
+        cells = [cell.strip() for cell in row]
+        if cells and cells[0].startswith("#"):
+            cells = [cell for cell in (cells[0].lstrip("# "), *cells[1:]) if cell]
+            if not all(_places(goal, cells) for goal in goals):
+                continue
+        if any(cells):
+            yield number, cells
+
+
+def _places(goal: Objective, header: Sequence[str]) -> list[int]:
+    """The columns that a header says to be of an objective."""
+    return [i for i, cell in enumerate(header) if cell in (goal.name, label(goal.name, goal.unit))]
+
+
 def _columns(header: Sequence[str], goals: Sequence[Objective], path: str | PathLike[str]) -> tuple[list[int], int | None]:
     """Where the objectives are, and the status, if it is there."""
     found = []
     for goal in goals:
-        at = [i for i, cell in enumerate(header) if cell in (goal.name, label(goal.name, goal.unit))]
+        at = _places(goal, header)
         if not at:
             raise ValueError(f"'{path}' has no column '{label(goal.name, goal.unit)}'; it has {', '.join(header)}")
         found.append(at[0])
@@ -188,7 +214,7 @@ def look_up(given: Any, label: str, address: str, data: Mapping[str, Any], goals
             if given is not None:
                 raise
             return None
-    if Path(given).suffix in (".nc", ".csv"):
+    if is_file(given):
         return Reference(read(given, goals), str(given), False)
     what, true = called(given)
     return Reference(foreign(closed_form(given), goals, "truth"), f"{what} of {given}", true)
@@ -197,7 +223,13 @@ def look_up(given: Any, label: str, address: str, data: Mapping[str, Any], goals
 def reference_addresses(given: Any) -> list[str]:
     """The addresses of code in a study's reference."""
     stated = given.values() if isinstance(given, Mapping) else [given]
-    return [one for one in stated if isinstance(one, str) and one not in ("union", "truth") and Path(one).suffix not in (".nc", ".csv")]
+    return [one for one in stated if isinstance(one, str) and one not in ("union", "truth") and not is_file(one)]
+
+
+def is_file(given: str) -> bool:
+    """Whether a reference is a file, by its name or since there is one, and not a case, such as `file.py:function`."""
+    path = Path(given)
+    return ":" not in given and path.suffix != ".py" and (path.suffix.lower() in FILES or (given not in CASES and path.is_file()))
 
 
 def check_reference(given: Any, stated: Mapping[str, CompiledProblem | CompiledVectorProblem]) -> None:

@@ -58,6 +58,7 @@ def test_mistakes_in_the_statement_name_the_users_own_things():
     problem.minimize("cost")
     mistakes = [
         (lambda: problem.variable("h", bounds=(0, 1)), "problem 'beam': the name 'h' is used twice"),
+        (lambda: problem.variable("l", bounds=(-1e308, 1e308)), "variable 'l' of problem 'beam', .* are too far apart"),
         (lambda: problem.variable("l", bounds=(1, 1)), "variable 'l' of problem 'beam' leave nothing to decide"),
         (lambda: problem.variable("l", bounds=(1, np.inf)), "variable 'l' of problem 'beam' must be finite"),
         (lambda: problem.variable("a", bounds=(0, 6), period=5), "'a' of problem 'beam' must be one period"),

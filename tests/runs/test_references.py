@@ -7,7 +7,7 @@ from macs import Front
 from problems.cases import goddard
 from problems.compiled import Objective
 from runs import gd, hypervolume
-from runs.measures.references import closed_form, foreign, read, union
+from runs.measures.references import closed_form, foreign, is_file, look_up, read, union
 
 GOALS = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
 A = np.array([[1.0, 1.0], [3.0, 3.0]])
@@ -51,6 +51,10 @@ def test_what_was_written_is_read(tmp_path):
         "speed, x, flight time [s]\n1.0, 7, 1.0\n3, 7, 3\n",
         "1.0,1.0\n\n3.0,3.0\n",
         "\ufeffflight time,speed [km/s],status\r\n1,1,converged\r\n0,nan,failed\r\n3,3,converged\r\n",
+        "# of last week\n1.000000000000000000e+00 1.0e+00\n3.0 3.0\n",
+        "flight time;speed;status\n1,0;1,0;converged\n3;3,0;converged\n",
+        "# speed;flight time\n1;1\n3;3",
+        "1\t1\n3\t3\n",
     ],
 )
 def test_tables_of_other_programs(tmp_path, text):
@@ -78,6 +82,14 @@ def test_tables_that_are_none(tmp_path, text, words):
         read(path, GOALS)
     with pytest.raises(ValueError, match="state the objectives"):
         read(path)
+
+
+def test_what_is_a_file(tmp_path):
+    for suffix in (".dat", ".txt", ".front", ""):
+        np.savetxt(tmp_path / f"pf{suffix}", A)
+        found = look_up(str(tmp_path / f"pf{suffix}"), "label", "", {}, GOALS)
+        assert found is not None and found.front.objectives.tolist() == A.tolist()
+    assert not any(map(is_file, ["goddard", "standard/car", "cases.py:build", "package.module:build"]))
 
 
 def test_closed_forms():

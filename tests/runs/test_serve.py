@@ -141,7 +141,7 @@ def test_no_file_is_served_by_its_path(client):
     for path in (
         *("/study.json", "/../study.json", "/details/../study.json", "/details/%2e%2e%2fstudy.json", "/..%2f..%2fetc/passwd"),
         *("//etc/passwd", "/static/main.js", "/scripts.js/", "/details/9-1.json", "/details/0-99.json", "/data", "/.progress"),
-        *("/?/../study.json", "/details/.json"),
+        *("/?/../study.json", "/details/.json", "//[", "HTTP://[::1"),
     ):
         answer = client.ask(path)
         assert answer.status == (200 if path.startswith("/?") else 404), path
@@ -292,6 +292,10 @@ def test_fronts_are_followed_one_alone_and_those_of_a_folder(tmp_path):
         data = client.seen(lambda found: len(found["comparisons"]) == 2 and found["unreadable"], "/data.json")
         assert {tuple(one["solvers"]) for one in data["comparisons"]} == {("first", "second"), ("other",)}
         assert "text.nc" in data["unreadable"][0]
+        assert len(client.server.followed._readings._known) == 3
+        (tmp_path / "second.nc").unlink()
+        client.seen(lambda found: all("second" not in one["solvers"] for one in found["comparisons"]), "/data.json")
+        assert len(client.server.followed._readings._known) == 2, "what is gone is forgotten"
 
 
 def test_an_address_that_cannot_be_had_is_one_line(out, refused):

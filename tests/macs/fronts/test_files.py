@@ -137,6 +137,14 @@ def test_any_seed_comes_back(seed):
     assert back == seed and type(back) is type(seed)
 
 
+def test_counts_that_another_program_has_written_as_10_0_are_whole():
+    written = {"evaluations": 10.0, "failures": {"infeasible": 3.0}, "seed": 7.0, "work": np.float64(5)}
+    back = files.from_bytes(files.to_bytes(black_box(stats=written))).stats
+    assert all(isinstance(back[name], int) for name in ("evaluations", "seed", "work")) and back["failures"] == {"infeasible": 3}
+    with pytest.raises(ValueError, match="stats"):
+        files.from_bytes(files.to_bytes(black_box(stats={"evaluations": 10.5})))
+
+
 def test_names_that_netcdf_does_not_allow_are_changed():
     names = legal_names(["h", "a/b", "time", "_x", "3", "", "a b", "é", "e\u0301", "x\0", "."], "state", {"time"})
     assert list(names.values()) == ["h", "a_b", "state_time", "state__x", "state_3", "state_", "state_a_b", "é", "state_é", "x_", "state_."]
