@@ -41,8 +41,7 @@ def test_indexing_gives_points_and_fronts():
     assert front[-1].objectives == {"time": front.objectives[4, 0], "height": front.objectives[4, 1]}
     for part, rows in ((front[1:4], [1, 2, 3]), (front[::-1], [4, 3, 2, 1, 0]), (front[[2, 0]], [2, 0]), (front[front.F[:, 0] > 15], None)):
         rows = np.flatnonzero(front.F[:, 0] > 15) if rows is None else rows
-        assert isinstance(part, Front)
-        assert np.array_equal(part.F, front.F[rows])
+        assert isinstance(part, Front) and np.array_equal(part.F, front.F[rows])
         assert [p.trajectory for p in part] == [front[i].trajectory for i in rows]
     with pytest.raises(IndexError, match="point 5 of a front of 5"):
         front[5]
@@ -51,12 +50,10 @@ def test_indexing_gives_points_and_fronts():
 
 def test_a_point_of_a_trajectory_front():
     point = flights()[2]
-    assert point.parameters == dict(point.trajectory.parameters)
-    assert point.decision.shape == (4,)
+    assert point.parameters == dict(point.trajectory.parameters) and point.decision.shape == (4,)
     assert point.violations.keys() == {"climb.load", "link"}
     assert point.optimality is None and flights(1, optimality=[1e-9])[0].optimality == 1e-9
-    assert np.array_equal(point.alone().F, point.F[None])
-    assert "time" in repr(point)
+    assert np.array_equal(point.alone().F, point.F[None]) and "time" in repr(point)
     point = black_box()[0]
     assert point.trajectory is None and point.excursions is None
     assert point.parameters.keys() == {"span", "chord", "twist"}
@@ -68,8 +65,7 @@ def test_the_problem_is_found_by_its_address_once(monkeypatch):
     calls = []
     monkeypatch.setattr("problems.load", lambda name, **data: calls.append((name, data)) or state_problem())
     front = flights(problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", {"a": 1}, trusted=True))
-    assert front.problem is None
-    assert front.compiled() is front.compiled()
+    assert front.problem is None and front.compiled() is front.compiled()
     assert calls == [("two_legs", {"a": 1})]
     monkeypatch.setattr("problems.load", lambda name, **data: state_problem(speed=4.0))
     front = flights(problem=ProblemSource("two legs", compiled().fingerprint, "two_legs", trusted=True))
@@ -90,8 +86,7 @@ def test_empty_fronts_have_a_message_and_the_closest_point_also_merged():
     assert Front.merge([black_box(0), black_box(0)]).closest is None
     stats = Front(F=np.empty((0, 2)), decision=[], violation=[], status=[], goals=compiled().goals).stats
     keys = ["evaluations", "inner_iterations", "gradient_solves", "failures", "wall_time", "seed", "tolerance", "versions", "reproducible"]
-    assert set(keys) <= set(stats)
-    assert {"python", "numpy", "casadi"} <= set(stats["versions"])
+    assert set(keys) <= set(stats) and {"python", "numpy", "casadi"} <= set(stats["versions"])
 
 
 def test_merging_keeps_what_nothing_dominates():

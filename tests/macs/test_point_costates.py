@@ -62,8 +62,7 @@ def test_costates_jump_where_edges_have_moved_to():
     costates, flown = point.costates["move"], point.trajectory["move"]
     assert costates["v"] == pytest.approx(-flown["u"], abs=0.01 * 6)
     on = (flown.time > 0.36) & (flown.time < 0.64)
-    assert on.any() and np.abs(costates["x"][on]).max() < 0.02 * 18
-    assert costates.error < 1e-6
+    assert on.any() and np.abs(costates["x"][on]).max() < 0.02 * 18 and costates.error < 1e-6
 
 
 def test_the_optimum_of_one_objective_has_weight_one():
@@ -137,8 +136,7 @@ def test_where_nothing_is_feasible_there_are_none():
     run.dynamics(x=u + 0 * x)
     problem.minimize("effort", run.integral(u**2))
     point = optimize(problem, parse("dfet:4x3"), starts=1)
-    assert point.status != "converged" and point.costates is None
-    assert point.plot().shape == (2,)
+    assert point.status != "converged" and point.costates is None and point.plot().shape == (2,)
 
 
 def test_a_file_has_them(ascents, tmp_path):

@@ -189,8 +189,7 @@ def test_one_point_is_the_best_of_any_preference():
         PhysicalProgramming({"time": Smaller.even(1, 100)}),
     ):
         ranking = preference.rank(front)
-        assert list(ranking.order) == [0]
-        assert ranking.best.objectives == J
+        assert list(ranking.order) == [0] and ranking.best.objectives == J
         assert np.isfinite(ranking.values).all()
     assert EQUAL.rank(front).values == pytest.approx([0.0])
 
@@ -198,8 +197,7 @@ def test_one_point_is_the_best_of_any_preference():
 def test_an_objective_that_is_not_a_number_is_never_best():
     front = plain_front([[np.nan, 0.0], [1.0, 2.0], [2.0, 1.0]], [Objective("a"), Objective("b")])
     ranking = WeightedSum({"b": 1.0}).rank(front)
-    assert np.isnan(front.F[2, 0])
-    assert list(ranking.order) == [1, 0, 2]
+    assert np.isnan(front.F[2, 0]) and list(ranking.order) == [1, 0, 2]
     assert ranking.values[2] == np.inf
     assert ranking.ranges == Ranges({"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 2.0})
 

@@ -160,8 +160,7 @@ def at(*objectives: float, **columns: Any) -> Any:
 def test_rounding_does_not_count_as_beyond_a_limit(share: float, within: bool) -> None:
     """What is met has a value, what is not has none: both are told by the same slack, exactly."""
     stage, point = limited((0, 0.0, "time at most 0")), at(share * LIMIT_TOL, 1.0)
-    assert within_limits(stage, point) is within
-    assert keeps_limits(stage, point, 1e-3) is within
+    assert within_limits(stage, point) is within and keeps_limits(stage, point, 1e-3) is within
     assert np.isfinite(stage.numbers(np.array([[*point.objectives.values()]]))[0]) == within
 
 

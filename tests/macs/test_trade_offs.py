@@ -82,8 +82,7 @@ def test_rates_and_matrix_of_three_objectives_in_closed_form(method):
     assert found.rate("effort", "distance") == pytest.approx(by["distance"], rel=2e-3)
     assert found.rate("time", "distance") == pytest.approx(by["distance"] / by["time"], rel=2e-3)
     assert found.rate(1, 2) == found.rate("time", "distance") == pytest.approx(1 / found.rate(2, 1))
-    assert found.matrix == pytest.approx(exact_matrix(T, D), rel=2e-3)
-    assert not found.messages
+    assert found.matrix == pytest.approx(exact_matrix(T, D), rel=2e-3) and not found.messages
 
 
 def test_units_and_scales_of_variables_do_not_matter():

@@ -172,8 +172,7 @@ def hamiltonian_flow(_: float, y: np.ndarray) -> list[float]:
 
 def test_the_table_is_a_front() -> None:
     reference = orbit_rise.reference()
-    assert reference.shape == (241, 2)
-    assert (np.diff(reference, axis=0) > 0).all()
+    assert reference.shape == (241, 2) and (np.diff(reference, axis=0) > 0).all()
     np.testing.assert_allclose(-reference[[0, -1], 1], [0.28345965587, -0.05344446957], atol=1e-10)
     for tf, energy, *costates in orbit_rise.reference_with_costates()[::24]:
         start = [orbit_rise.START_RADIUS, 0.0, orbit_rise.START_RADIUS**-0.5, *costates]

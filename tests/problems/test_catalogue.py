@@ -87,13 +87,11 @@ def test_files_of_the_same_name_do_not_disturb_each_other(case, tmp_path):
     other = tmp_path / "other" / case.name
     other.parent.mkdir()
     other.write_text(CASE.replace('"mine"', '"other"'))
-    assert load(f"{case}:problem").name == "mine"
-    assert load(f"{other}:problem").name == "other"
+    assert load(f"{case}:problem").name == "mine" and load(f"{other}:problem").name == "other"
     assert load(f"{case}:problem").name == "mine"
     (case.parent / "beside_the_case.py").write_text("from problems import Problem\n")
     case.write_text("from beside_the_case import Problem\n" + CASE.replace("from __future__ import annotations", ""))
-    assert load(f"{case}:problem").name == "mine"
-    assert str(case.parent) not in sys.path
+    assert load(f"{case}:problem").name == "mine" and str(case.parent) not in sys.path
 
 
 def test_what_is_no_case_is_refused(case):

@@ -125,8 +125,7 @@ def test_what_was_stated_can_be_read_back():
     problem.maximize("gain", gain, unit="m")
     assert problem.name == "glider"
     assert problem.phases["descent"] is phase and list(problem.phases) == ["descent"]
-    assert problem.parameters["mass"] is mass
-    assert problem.objectives["gain"] is gain
+    assert problem.parameters["mass"] is mass and problem.objectives["gain"] is gain
     assert phase.name == "descent"
     assert phase["height"].name() == "height" and phase["flap"].name() == "flap"
     assert all(ca.MX.is_symbolic(symbol) for symbol in (phase.time, phase.t0, phase.tf))

@@ -211,8 +211,7 @@ def test_the_oscillation_is_exact_in_the_search_and_smooth_for_gradients():
     for j in range(8):
         x, u = flight.state.on_element(j, nodes), flight.controls_on(j, nodes)
         total += 125.0 * weights @ np.array([by_hand(*pair)[0][4] for pair in zip(x, u, strict=True)]).__abs__()
-    assert nlp.evaluate(Z)[0][0, 2] == pytest.approx(total, rel=1e-3)
-    assert phase.sized == (1,)
+    assert nlp.evaluate(Z)[0][0, 2] == pytest.approx(total, rel=1e-3) and phase.sized == (1,)
 
 
 LIMITS = {"case1": (200, 280, 2.5), "case2": (150, 250, 1.25), "case3": (200, 280, 2.5)}
@@ -271,8 +270,7 @@ def test_the_reference_is_a_front(case):
     rows = front_of(case)
     front = closed_form(f"reentry_{case}")
     np.testing.assert_array_equal(front, rows[:, :4])
-    assert len(front) >= 15 and np.isfinite(rows).all()
-    assert is_nondominated(front * SIGNS).all()
+    assert len(front) >= 15 and np.isfinite(rows).all() and is_nondominated(front * SIGNS).all()
 
 
 @pytest.mark.slow

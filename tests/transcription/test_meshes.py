@@ -111,8 +111,7 @@ def test_decay_rates_scales_curvatures_and_densities_of_nothing():
 
     # 1 / (1 + a^2 tau^2) is analytic within an ellipse, whose size is the rate.
     assert rate(lambda t: 1 / (1.5 - t)) == pytest.approx(np.log(1.5 + np.sqrt(1.25)), abs=0.2)
-    assert rate(np.abs) < 0.5 and rate(np.sign) < 0.3
-    assert rate(lambda t: 2.0 + 0 * t) == np.inf
+    assert rate(np.abs) < 0.5 and rate(np.sign) < 0.3 and rate(lambda t: 2.0 + 0 * t) == np.inf
     low, high, span = np.array([0.0, 5.0, -1e-9, 0.0, -3.0]), np.array([2.0, 5.0, 1e-9, 9.0, 4.0]), np.array([1e4, 1e4, 10.0, 3.0, 7.0])
     assert own_scales(low, high, span) == pytest.approx([2.0, 1e-2, 1e-5, 3.0, 7.0])
     places = np.sort(np.random.default_rng(0).uniform(-1, 1, 40))
@@ -275,8 +274,7 @@ def test_intervals_have_equal_shares(density, count):
 def test_a_floor_bounds_the_longest_interval(density, count, least):
     places, values = density
     found = raised(places, values, least)
-    assert integrals(places, found)[-1] == pytest.approx(1.0)
-    assert found.min() >= least - 1e-12
+    assert integrals(places, found)[-1] == pytest.approx(1.0) and found.min() >= least - 1e-12
     assert np.diff(equidistributed(places, found, count)).max() <= 1.0 / (least * count) + 1e-12
     if least == 1.0:
         assert equidistributed(places, found, count) == pytest.approx(np.linspace(0, 1, count + 1), abs=1e-12)

@@ -218,8 +218,7 @@ def least_fuel():
 def test_a_landing_switches_where_it_should(word):
     problem, fuel, switch = moon_landing()
     found, method = followed(problem, parse(word))
-    assert found[0][0] - fuel > 1e-4
-    assert found[1][0] == pytest.approx(fuel, rel=1e-8)
+    assert found[0][0] - fuel > 1e-4 and found[1][0] == pytest.approx(fuel, rel=1e-8)
     for _, flight in found[1:]:
         mesh = method.mesh_of("fall")
         assert flight["fall"].state.edges[mesh.moving[0]] == pytest.approx(switch, abs=1e-7) and len(mesh.moving) == 1

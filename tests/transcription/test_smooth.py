@@ -48,8 +48,7 @@ def test_candidates_vary_about_the_guess_within_bounds(mesh) -> None:
     nlp = mesh.transcribe(problem)
     lower, upper = nlp.lower[nlp.free], nlp.upper[nlp.free]
     X = Smooth(spread=0.1).draw(problem, mesh, 4000, np.random.default_rng(0))
-    assert X.shape == (4000, len(nlp.free))
-    assert ((lower <= X) & (upper >= X)).all()
+    assert X.shape == (4000, len(nlp.free)) and ((lower <= X) & (upper >= X)).all()
     throttle = columns(nlp, "throttle")
     assert X[:, throttle].mean(axis=0) == pytest.approx(nlp.guess[throttle], abs=0.02)
     assert X[:, throttle].std(axis=0) == pytest.approx(0.2, rel=0.06)

@@ -23,8 +23,7 @@ def test_hypercubes_by_hand() -> None:
     cube = hypercubes(F, 4)  # sides of 1 and of 2.5
     assert cube[0] == cube[1]
     assert cube[3] == cube[4]  # the greatest value belongs to the last part
-    assert len(set(cube)) == 4
-    assert hypercubes(np.ones((3, 2)), 30).tolist() == [0, 0, 0]
+    assert len(set(cube)) == 4 and hypercubes(np.ones((3, 2)), 30).tolist() == [0, 0, 0]
     assert len(set(hypercubes(np.stack([np.arange(30.0), np.ones(30)], axis=1), 30))) == 30
     best = np.array([[1.0, 1.0]] * 4)
     F = np.array([[0.5, 1.0], [1.0, 1.5], [0.5, 1.5], [0.5, 1.5]])
@@ -50,8 +49,7 @@ def test_the_roulette_prefers_thin_hypercubes() -> None:
     assert share == pytest.approx(np.array([1 / 9, 1 / 9, 1 / 9, 1, 1 / 4, 1 / 4]) / wheel, abs=0.01)
     cube = np.array([0, 1, 0, 1, 0, 2, 0, 2, 3])
     keep = thin_out(cube, 5, np.random.default_rng(1))
-    assert sorted(np.bincount(cube[keep], minlength=4)) in ([1, 1, 1, 2],)
-    assert keep[8]
+    assert sorted(np.bincount(cube[keep], minlength=4)) in ([1, 1, 1, 2],) and keep[8]
     kept = [tuple(np.flatnonzero(thin_out(cube, 4, np.random.default_rng(seed)))) for seed in range(50)]
     assert all(sorted(cube[list(rows)]) == [0, 1, 2, 3] for rows in kept)
     assert len(set(kept)) > 10  # which of those in a hypercube is left to chance
@@ -93,8 +91,7 @@ def test_bounds_stop_and_turn_particles_and_periods_let_them_through() -> None:
 def test_particles_stay_in_the_box(X, V, seed) -> None:
     for box in (PLAIN, ROUND):
         there, speed = moved(box, X, V, -np.random.default_rng(seed).random((6, 2)))
-        assert ((there >= 0) & (there <= 1)).all()
-        assert (np.abs(speed) <= np.abs(V)).all()
+        assert ((there >= 0) & (there <= 1)).all() and (np.abs(speed) <= np.abs(V)).all()
 
 
 def schaffer(X: np.ndarray) -> np.ndarray:
@@ -134,8 +131,7 @@ def test_the_swarm_begins_with_feasible_particles_only_and_their_search_is_count
         drawn.append(state.members)
     assert (state.members.violation <= box.tolerance).all()
     assert state.launched == box.counts.evaluations == 10 * len(drawn)
-    assert 50 <= state.launched <= 400
-    assert state.all_feasible == len(drawn) >= state.first_feasible
+    assert 50 <= state.launched <= 400 and state.all_feasible == len(drawn) >= state.first_feasible
     for _ in range(20):  # a feasible best place is never given up
         method.advance(state, box, 1000)
         assert (state.best.violation <= box.tolerance).all()
@@ -149,8 +145,7 @@ def test_a_search_that_finds_too_few_ends_with_its_share_and_the_swarm_flies_the
     state = method.begin(box, 2000, np.random.default_rng(1))
     while state.launched < 0:
         method.advance(state, box, 2000)
-    assert state.launched == 200
-    assert not len(state.archive) and len(state.closest) == 1
+    assert state.launched == 200 and not len(state.archive) and len(state.closest) == 1
     while box.counts.evaluations < 2000:
         method.advance(state, box, 2000)
     assert len(state.archive) and (state.archive.violation <= box.tolerance).all()
@@ -166,8 +161,7 @@ def test_without_a_search_for_feasible_particles_none_are_drawn(more) -> None:
 def test_zdt(kind) -> None:
     function, bounds, truth = zdt(kind)
     front = MOPSO().minimize(function, bounds, evaluations=10_000, seed=1)
-    assert igd(front.F, ref=truth) < 0.1
-    assert 50 <= len(front) <= 100
+    assert igd(front.F, ref=truth) < 0.1 and 50 <= len(front) <= 100
 
 
 @pytest.mark.slow
@@ -210,8 +204,7 @@ def test_the_front_of_srn() -> None:
     front = MOPSO(particles=40, degree="sum").minimize(srn, [(-20, 20)] * 2, evaluations=6000, seed=1)
     y = np.linspace(-14.79, 2.5, 500)
     truth = np.stack([2 + 4.5**2 + (y - 1) ** 2, -22.5 - (y - 1) ** 2], axis=1)
-    assert (front.violation <= 1e-6).all()
-    assert igd(front.F, ref=truth) < 0.02 * np.ptp(truth)
+    assert (front.violation <= 1e-6).all() and igd(front.F, ref=truth) < 0.02 * np.ptp(truth)
 
 
 class Compass(Evaluator):
@@ -236,6 +229,5 @@ def test_periodic_variables_are_closed() -> None:
     while box.counts.evaluations < 400:
         method.advance(state, box, 400)
     heading = (state.archive.Z[:, 0] + 180) % 360 - 180
-    assert (np.abs(heading) < 15).all()
-    assert heading.min() < -5 and heading.max() > 5
+    assert (np.abs(heading) < 15).all() and heading.min() < -5 and heading.max() > 5
     assert np.count_nonzero(np.abs(state.members.Z[:, 0] - 180) > 120) >= 8  # so is the swarm, on both sides of the cut

@@ -238,8 +238,7 @@ def test_feasible_points_come_before_infeasible_ones_at_any_size_of_numbers(sett
         return 1e9 * schaffer(X), 1e-4 * (np.abs(X - 1.4).sum(axis=1, keepdims=True) - 1.2)
 
     front = settings.minimize(function, CUBE, evaluations=250, seed=2, tolerance=1e-12)
-    assert len(front)
-    assert (np.abs(front.decision - 1.4).sum(axis=1) <= 1.2 + 1e-7).all()
+    assert len(front) and (np.abs(front.decision - 1.4).sum(axis=1) <= 1.2 + 1e-7).all()
     assert front.F[:, 1].min() <= 0.6e9  # 0, at x = (1, 1, 1)
 
 
@@ -360,8 +359,7 @@ def test_objectives_whose_number_only_an_evaluation_tells_and_single_ones() -> N
     assert warnings.filters == before
     for settings in (NSGA2(population=20), MOPSOCD(particles=20)):
         front = settings.minimize(lambda X: (X**2).sum(axis=1, keepdims=True), CUBE, evaluations=300, seed=1)
-        assert len(front) == 1
-        assert front.F[0, 0] < 0.5
+        assert len(front) == 1 and front.F[0, 0] < 0.5
 
 
 def test_the_whole_front_of_a_population_holds_the_nearest_to_the_directions_and_changes_nothing_else():
@@ -438,8 +436,7 @@ def test_vectors_are_not_adapted_to_an_objective_that_is_always_the_same() -> No
         return np.hstack([schaffer(X), np.ones((len(X), 1))])
 
     state = run(RVEA(divisions=6), boxed(function, CUBE), 28 * 20)
-    assert np.isfinite(state.vectors).all()
-    assert len(state.archive) >= 5
+    assert np.isfinite(state.vectors).all() and len(state.archive) >= 5
 
 
 def test_the_two_archives_are_full_and_only_the_first_has_to_be_feasible() -> None:

@@ -113,8 +113,7 @@ def test_failed_rows_constraints_and_senses():
     box = boxed(function, [(0, 1)], senses=["minimize", "maximize"], constraints=lambda X: X - 2.0)
     result = box.evaluate(np.array([[0.0], [0.5], [1.0]]))
     assert result.status.tolist() == ["converged", "failed", "infeasible"]
-    assert result.violation.tolist() == [0.0, np.inf, 0.5]
-    assert np.isnan(result.F[1]).all()
+    assert result.violation.tolist() == [0.0, np.inf, 0.5] and np.isnan(result.F[1]).all()
     assert result.F[0].tolist() == [0.0, -1.0]
     assert box.counts.failures == {"failed": 1, "infeasible": 1}
 
@@ -156,8 +155,7 @@ def test_what_is_feasible_does_not_depend_on_the_units_of_constraints(unit):
 def test_pymoo_problems_vectorised_and_elementwise_with_equalities():
     tnk = boxed(get_problem("tnk"))
     result = tnk.evaluate(middle(tnk))
-    assert (tnk.m, result.F.shape) == (2, (3, 2))
-    assert (result.violation > 0).all()
+    assert (tnk.m, result.F.shape) == (2, (3, 2)) and (result.violation > 0).all()
 
     class OnCircle(ElementwiseProblem):
         def __init__(self):

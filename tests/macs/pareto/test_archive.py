@@ -37,8 +37,7 @@ def test_members_are_few_feasible_different_and_mutually_nondominated_and_extrem
         archive = offer(archive, F, limit, violation)
         seen.append(F[violation <= 1e-6])
         every = np.vstack(seen)
-        assert len(archive) <= limit
-        assert not dominates(archive.F[:, None], archive.F[None]).any()
+        assert len(archive) <= limit and not dominates(archive.F[:, None], archive.F[None]).any()
         assert len(np.unique(archive.F, axis=0)) == len(archive)
         if len(every):
             assert np.array_equal(archive.F.min(axis=0), every.min(axis=0))
@@ -51,12 +50,10 @@ def test_nothing_infeasible_failed_or_equal_comes_in():
     assert offer(archive, [[1.0, 2.0]]).F.tolist() == [[1.0, 2.0]]
     assert offer(archive, [[1.0, 1.0]]).F.tolist() == [[1.0, 1.0]]
     archive = offer(empty(1), [[3.0], [1.0], [2.0]])
-    assert archive.F.tolist() == [[1.0]]
-    assert offer(archive, [[0.5], [4.0]]).F.tolist() == [[0.5]]
+    assert archive.F.tolist() == [[1.0]] and offer(archive, [[0.5], [4.0]]).F.tolist() == [[0.5]]
     archive = offer(empty(2), quarter_circle(40)[5:35], limit=5)
     archive = offer(archive, [[-0.5, 3.0]], limit=5)
-    assert len(archive) == 5
-    assert archive.F.min(axis=0)[0] == -0.5
+    assert len(archive) == 5 and archive.F.min(axis=0)[0] == -0.5
 
 
 @given(st.integers(2, 4), st.integers(4, 12), st.integers(0, 2**32 - 1), st.booleans())
@@ -69,8 +66,7 @@ def test_extremes_are_chosen_and_energy_never_rises_unless_they_were_missing(m, 
         members[best] = True
     members[rng.permutation(np.flatnonzero(~members))[: limit - members.sum()]] = True
     chosen = spread(F, limit, members)
-    assert chosen.sum() == limit
-    assert chosen[best].all()
+    assert chosen.sum() == limit and chosen[best].all()
     if members[best].all():
         assert energy(F, chosen) <= energy(F, members) * (1 + 1e-9)
 
@@ -79,8 +75,7 @@ def test_a_missing_extreme_is_added_at_any_cost_and_distances_are_in_ranges_by_f
     F = np.array([[0.0, 0.01, 1.0], [0.01, 0.0, 0.9], [1.0, 1.0, 0.0], [0.3, 0.5, 0.5]])
     members = np.array([True, False, True, True])
     chosen = spread(F, 3, members)
-    assert chosen.tolist() == [True, True, True, False]
-    assert energy(F, chosen) > energy(F, members)
+    assert chosen.tolist() == [True, True, True, False] and energy(F, chosen) > energy(F, members)
     F = np.array([[3.0, 2.0, 2.0], [2.0, 2.0, 1.0], [1.0, 3.0, 3.0], [2.0, 1.0, 3.0]])
     assert spread(F, 2).tolist() == [False, False, True, True]
     F = np.stack([np.linspace(0, 1, 5), np.linspace(1, 0, 5), np.full(5, 7.0)], axis=1)
@@ -99,8 +94,7 @@ def test_the_archive_spreads_evenly_and_keeps_the_ends():
     for rows in rng.permutation(2000).reshape(-1, 20):
         archive = offer(archive, F[rows])
     gaps = np.linalg.norm(np.diff(archive.F[np.argsort(archive.F[:, 0])], axis=0), axis=1)
-    assert archive.F.min(axis=0).tolist() == [0.0, 0.0]
-    assert gaps.max() / gaps.min() < 1.25
+    assert archive.F.min(axis=0).tolist() == [0.0, 0.0] and gaps.max() / gaps.min() < 1.25
 
 
 @pytest.mark.parametrize("scale", [1e-4, 1.0])
@@ -110,8 +104,7 @@ def test_points_that_almost_coincide_drown_nothing(exponent, scale):
     F = np.vstack([curve, curve[1:-1] + scale * np.array([1e-10, -1e-10])])
     chosen = spread(F, 12, exponent=exponent)
     gaps = np.linalg.norm(np.diff(F[chosen][np.argsort(F[chosen][:, 0])], axis=0), axis=1)
-    assert chosen.sum() == 12
-    assert gaps.max() / gaps.min() < 1.6
+    assert chosen.sum() == 12 and gaps.max() / gaps.min() < 1.6
 
 
 @pytest.mark.parametrize(("m", "high", "least"), [(3, None, 0.7), (4, 8.0, 0.6)])
@@ -129,8 +122,7 @@ def test_surfaces_are_covered_evenly_with_their_ends(m, high, least):
         nearest = apart.min(axis=1)
         spreads[exponent] = nearest.min() / nearest.mean()
         assert all((corner == archive.F).all(axis=1).any() for corner in np.eye(m))
-    assert spreads[high] > least
-    assert spreads[high] > spreads[2.0]
+    assert spreads[high] > least and spreads[high] > spreads[2.0]
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.0, 1), (1.0, 1), (1.001, 0), (5.0, 0), (100.0, 0)])

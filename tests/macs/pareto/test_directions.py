@@ -25,8 +25,7 @@ from macs.pareto.dominance import normalised
 @given(st.integers(1, 6), st.integers(1, 300))
 def test_directions_are_unit_nonnegative_different_and_begin_with_the_orthogonal_ones(m, size):
     directions = pool(m, size)
-    assert np.allclose(np.linalg.norm(directions, axis=1), 1.0)
-    assert (directions >= 0.0).all()
+    assert np.allclose(np.linalg.norm(directions, axis=1), 1.0) and (directions >= 0.0).all()
     assert np.array_equal(directions[:m], np.eye(m))
     assert len(np.unique(np.round(directions, 12), axis=0)) == len(directions)
     assert len(directions) <= max(size, m) + 1
@@ -46,8 +45,7 @@ def test_lattice_is_whole_and_sums_to_one(m, divisions):
 def test_the_orthogonal_directions_are_always_drawn(m, extra, seed):
     directions = pool(m, 100)
     rows = draw(directions, m + extra, np.random.default_rng(seed))
-    assert rows.shape == (m + extra,)
-    assert rows[:m].tolist() == list(range(m))
+    assert rows.shape == (m + extra,) and rows[:m].tolist() == list(range(m))
     if m > 1:
         assert len(set(rows.tolist())) == m + extra
 
@@ -56,8 +54,7 @@ def test_the_orthogonal_directions_are_always_drawn(m, extra, seed):
 def test_no_direction_is_drawn_twice_before_all_are_taken(m, count, seed):
     directions = pool(m, 12)
     rows = draw(directions, count, np.random.default_rng(seed))
-    assert rows.shape == (count,)
-    assert len(set(rows.tolist())) == min(count, len(directions))
+    assert rows.shape == (count,) and len(set(rows.tolist())) == min(count, len(directions))
 
 
 @given(st.integers(1, 4), st.integers(0, 2**32 - 1))
@@ -100,14 +97,12 @@ def test_directions_on_a_surface_are_those_of_a_lattice_and_its_centre(m, size, 
     """Lattices of three objectives have 3, 6, 10, 15, 21 points, of four 4, 10, 20, 35; the centre is one of them if
     m divides the divisions."""
     directions = pool(m, size)
-    assert len(directions) == count
-    assert np.isclose(directions, m**-0.5).all(axis=1).sum() == 1
+    assert len(directions) == count and np.isclose(directions, m**-0.5).all(axis=1).sum() == 1
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 50])
 def test_of_two_objectives_there_are_as_many_directions_as_wanted_and_of_one_there_is_one(size):
-    assert len(pool(2, size)) == max(size, 2)
-    assert pool(1, size).tolist() == [[1.0]]
+    assert len(pool(2, size)) == max(size, 2) and pool(1, size).tolist() == [[1.0]]
 
 
 def test_a_direction_with_a_larger_share_is_drawn_more_often():

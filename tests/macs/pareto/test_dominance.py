@@ -38,16 +38,14 @@ def test_nondominated_rows_are_those_that_no_other_row_dominates(F):
 def test_dominance_is_weak_dominance_without_equality(F):
     strict, weak = dominates(F[:, None], F[None]), (F[:, None] <= F[None]).all(axis=-1)
     equal = (F[:, None] == F[None]).all(axis=-1)
-    assert np.array_equal(strict, weak & ~equal)
-    assert not (strict & strict.T).any()
+    assert np.array_equal(strict, weak & ~equal) and not (strict & strict.T).any()
 
 
 def test_rows_with_nan_are_never_kept_and_never_dominate():
     F = np.array([[np.nan, 0.0], [1.0, 1.0], [2.0, 2.0]])
     assert nondominated(F).tolist() == [False, True, False]
     assert nondominated(np.full((2, 2), np.nan)).tolist() == [False, False]
-    assert nondominated(np.empty((0, 2))).shape == (0,)
-    assert not dominates(F[0], F[2])
+    assert nondominated(np.empty((0, 2))).shape == (0,) and not dominates(F[0], F[2])
     F = np.array([[0.0, 5.0], [0.0, 3.0], [2.0, 1.0], [1.0, 1.0]])
     assert extremes(F).tolist() == [1, 3]
 
@@ -82,8 +80,7 @@ def test_points_far_worse_for_a_little_of_one_objective_are_left_out_but_not_the
     F = np.stack([np.cos(a), np.sin(a), np.linspace(0.4, 0.6, 6)], axis=1)
     least = F[:, 0].min()
     far = np.vstack([F, [least - 1e-4, 5.0, 5.0], [least - 2e-4, 5.1, 5.1]])
-    assert nondominated(far).all()
-    assert alpha_nondominated(F).all()
+    assert nondominated(far).all() and alpha_nondominated(F).all()
     assert alpha_nondominated(far).tolist() == [True] * 6 + [False, True]
     F = np.array([[0.0, 1.0], [0.5, 0.4], [1.0, 0.0], [0.9, 0.39]])
     assert alpha_nondominated(np.column_stack([F, np.full(4, 1e20)])).tolist() == alpha_nondominated(F).tolist()
@@ -119,8 +116,7 @@ def test_what_is_equal_is_no_worse_and_what_failed_is_never_taken():
 
 def test_ranges_neighbours_normalised_values_and_points_that_differ_by_rounding():
     F = np.array([[1.0, 7.0, -0.5], [4.0, 7.0, -0.5]])
-    assert ranges(F).tolist() == [3.0, 7.0, 1.0]
-    assert ranges(-F).tolist() == [3.0, 7.0, 1.0]
+    assert ranges(F).tolist() == [3.0, 7.0, 1.0] and ranges(-F).tolist() == [3.0, 7.0, 1.0]
     # In the units as they are the second would be the nearer one.
     F = np.array([[100.0, 0.0], [0.0, 3.0], [0.0, 0.0]])
     assert nearest(np.zeros(2), F, np.array([1000.0, 1.0])).tolist() == [2, 0, 1]

@@ -83,8 +83,7 @@ def test_the_penalty_weighs_the_distance_from_a_direction(share, wins):
     gain = 0.02 * np.linalg.norm(lattice[middle])
     other = 0.98 * lattice[middle] + share * gain / PENALTY * np.array([1.0, -1.0, 0.0, 0.0]) / np.sqrt(2.0)
     chosen = best_of_niches(np.vstack([lattice, other]), len(lattice))
-    assert chosen[-1] == wins
-    assert chosen[middle] != wins
+    assert chosen[-1] == wins and chosen[middle] != wins
 
 
 def test_an_archive_of_many_objectives_goes_forward_where_points_far_behind_are_not_dominated():
@@ -94,8 +93,7 @@ def test_an_archive_of_many_objectives_goes_forward_where_points_far_behind_are_
         F = np.abs(rng.normal(size=(60, 6)))
         F = far * F / np.linalg.norm(F, axis=1, keepdims=True)
         archive = insert(archive, np.zeros((60, 1)), F, np.zeros(60), limit=40, tolerance=1e-6)
-        assert len(archive) == 40
-        assert not dominates(archive.F[:, None], archive.F).any()
+        assert len(archive) == 40 and not dominates(archive.F[:, None], archive.F).any()
     assert np.median(np.linalg.norm(archive.F, axis=1)) == pytest.approx(1.0)
 
 

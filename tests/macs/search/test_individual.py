@@ -45,8 +45,7 @@ def test_every_proposal_is_in_the_box(seed, wrap):
         like_improvements(cube, X, rng.normal(size=(10, d)), rng),
     ]
     for trial in proposals:
-        assert trial.shape == X.shape
-        assert ((trial >= 0.0) & (trial <= 1.0)).all()
+        assert trial.shape == X.shape and ((trial >= 0.0) & (trial <= 1.0)).all()
         values = cube.to_values(trial)
         assert ((values >= -2.0) & (values <= 6.0)).all()
 
@@ -81,8 +80,7 @@ def test_inertia_and_differential_evolution_along_velocities_and_differences():
     trial = inertia(cube, X, velocity, np.ones(2), True, rng)
     assert np.array_equal(trial[0], X[0])
     step = trial[1] - X[1]
-    assert np.allclose(step / step[0], velocity[1] / velocity[1, 0])
-    assert 0 < step[0] <= 0.1
+    assert np.allclose(step / step[0], velocity[1] / velocity[1, 0]) and 0 < step[0] <= 0.1
     rng = np.random.default_rng(0)
     X, donors = np.full((3, 5), 0.5), rng.random((3, 3, 5))
     assert (differential(box(5), X, donors, 0.9, 0.0, rng) != X).sum(axis=1).tolist() == [1, 1, 1]

@@ -60,8 +60,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     while state.evaluations < 600:
         settings.advance(state, box, 600)
         settings.advance(kept, other, 600)
-    assert np.array_equal(state.archive.Z, kept.archive.Z)
-    assert state.iteration == kept.iteration
+    assert np.array_equal(state.archive.Z, kept.archive.Z) and state.iteration == kept.iteration
 
 
 def test_failed_and_infeasible_evaluations_never_enter_the_archive():
@@ -72,29 +71,24 @@ def test_failed_and_infeasible_evaluations_never_enter_the_archive():
         return F
 
     state = run(MACS(), boxed(function, [(-2, 2)] * 3), 600)
-    assert len(state.archive) == 10
-    assert (state.archive.Z[:, 0] <= 0.3).all()
+    assert len(state.archive) == 10 and (state.archive.Z[:, 0] <= 0.3).all()
     assert np.isfinite(state.archive.F).all()
     nothing = run(MACS(), boxed(lambda X: np.full((len(X), 2), np.nan), [(0, 1)] * 2), 300)
-    assert len(nothing.archive) == 0
-    assert nothing.evaluations == 300
+    assert len(nothing.archive) == 0 and nothing.evaluations == 300
     box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: np.abs(X[:, 1:] - 0.5) - 0.05)
     state = run(MACS(), box, 1500)
-    assert len(state.archive) == 10
-    assert len(state.closest) == 0
+    assert len(state.archive) == 10 and len(state.closest) == 0
     assert (np.abs(state.archive.Z[:, 1:] - 0.5) <= 0.05 + 1e-6).all()
     box = boxed(schaffer, [(-2, 2)] * 3, constraints=lambda X: 1 + X**2)
     state = run(MACS(), box, 1000)
-    assert len(state.archive) == 0
-    assert len(state.closest) == 1 and len(state.infeasible) == 10
+    assert len(state.archive) == 0 and len(state.closest) == 1 and len(state.infeasible) == 10
     assert 1.0 <= state.closest.violation[0] < 1.02 and (np.diff(state.infeasible.violation) >= 0.0).all()
     assert state.closest.violation[0] <= state.agents.violation.min()
 
 
 def test_one_objective_one_that_does_not_vary_and_more_than_there_are_points():
     state = run(MACS(), boxed(lambda X: ((X - 0.3) ** 2).sum(axis=1), [(-2, 2)] * 5), 2000)
-    assert state.archive.F.shape == (1, 1)
-    assert state.archive.F[0, 0] < 1e-4
+    assert state.archive.F.shape == (1, 1) and state.archive.F[0, 0] < 1e-4
     state = run(MACS(), boxed(lambda X: np.hstack([schaffer(X), np.ones((len(X), 1))]), [(-2, 2)] * 2), 500)
     assert len(state.archive) == 10
     box = boxed(lambda X: np.hstack([schaffer(X), X]), [(-2, 2)] * 3)
@@ -110,8 +104,7 @@ def test_periodic_variables_cross_their_bounds():
     box.period = np.ones(6)
     state = run(MACS(), box, 2000)
     X = (state.archive.Z + 0.5) % 1.0 - 0.5
-    assert (np.abs(X) < 0.1).all()
-    assert ((state.archive.Z >= 0) & (state.archive.Z <= 1)).all()
+    assert (np.abs(X) < 0.1).all() and ((state.archive.Z >= 0) & (state.archive.Z <= 1)).all()
 
 
 def test_the_best_of_each_objective_is_never_lost():
@@ -120,8 +113,7 @@ def test_the_best_of_each_objective_is_never_lost():
     while state.evaluations < 1000:
         settings.advance(state, box, 1000)
         now = state.archive.F.min(axis=0)
-        assert (now <= best).all()
-        assert np.array_equal(now, state.ideal)
+        assert (now <= best).all() and np.array_equal(now, state.ideal)
         assert not dominates(state.archive.F[:, None], state.archive.F[None]).any()
         best = now
 
@@ -132,8 +124,7 @@ def test_a_start_is_evaluated_first_and_too_many_are_thinned():
     state = MACS().begin(box, 100, np.random.default_rng(0), start)
     assert (state.evaluations, len(state.agents)) == (25, 10)
     few = MACS().begin(boxed(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.zeros((1, 3)))
-    assert few.evaluations == 10
-    assert 0.0 in few.archive.F[:, 0]
+    assert few.evaluations == 10 and 0.0 in few.archive.F[:, 0]
     outside = MACS().begin(boxed(schaffer, [(-2, 2)] * 3), 100, np.random.default_rng(0), np.full((12, 3), 5.0))
     assert outside.agents.Z.max() == 2.0
 

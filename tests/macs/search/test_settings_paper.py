@@ -37,8 +37,7 @@ def test_directions_are_equally_spaced_and_kept_for_the_whole_run():
     settings, box = MACS.paper(), boxed(schaffer, [(-2, 2)] * 3)
     state = settings.begin(box, 600, np.random.default_rng(0))
     first = owned(state)
-    assert np.allclose(np.sort(first), np.arange(0, 91, 10))
-    assert first[:2].tolist() == [90.0, 0.0]
+    assert np.allclose(np.sort(first), np.arange(0, 91, 10)) and first[:2].tolist() == [90.0, 0.0]
     while state.evaluations < 600:
         settings.advance(state, box, 600)
         assert np.array_equal(owned(state), first)
@@ -83,8 +82,7 @@ def test_pattern_search_leaves_its_displacement():
     before = state.agents.Z.copy()
     individual()
     moved = (before != state.agents.Z).any(axis=1)
-    assert 0 < moved.sum() < 10
-    assert (state.agents.velocity[moved] == 0.0).all()
+    assert 0 < moved.sum() < 10 and (state.agents.velocity[moved] == 0.0).all()
     assert (state.agents.velocity[~moved] == [0.1, -0.1]).all()
 
 

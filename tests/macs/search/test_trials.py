@@ -43,8 +43,7 @@ def test_velocity_credit_and_memory_are_of_what_was_achieved():
     rows = np.array([2, 5])
     X = trials.positions(rows)
     success = trials.evaluate_and_accept(rows, X, X + np.array([[-0.2, 0.1], [0.1, 0.1]]))
-    assert success.tolist() == [True, False]
-    assert np.allclose(state.agents.velocity[2], [-0.2, 0.0])
+    assert success.tolist() == [True, False] and np.allclose(state.agents.velocity[2], [-0.2, 0.0])
     assert np.allclose(state.agents.Z[2], [0.6, 0.6, 0.5])
     assert (state.agents.velocity[5] == 0.0).all()
     _, _, trials = prepared()
@@ -57,8 +56,7 @@ def test_velocity_credit_and_memory_are_of_what_was_achieved():
     rows = np.array([3])
     X = trials.positions(rows)
     trials.evaluate_and_accept(rows, X, X - 0.1)
-    assert box.started_from[-1].tolist() == [0.123]
-    assert box.started_from[0].tolist() == [7.0] * 10
+    assert box.started_from[-1].tolist() == [0.123] and box.started_from[0].tolist() == [7.0] * 10
 
 
 @pytest.mark.parametrize(
@@ -79,8 +77,7 @@ def test_what_is_only_looked_at_is_seen_and_changes_no_agent():
     before, rows = copy.deepcopy(state), np.array([2, 5, 6])
     X = trials.positions(rows)
     looked, result = trials.evaluate(state.agents.Z[rows], X, X - np.array([[0.2, 0.0], [0.0, 0.0], [0.3, 0.0]]))
-    assert looked.tolist() == [0, 2]
-    assert np.allclose(result.F[:, 0], [0.6, 0.5])
+    assert looked.tolist() == [0, 2] and np.allclose(result.F[:, 0], [0.6, 0.5])
     assert trials.seen == [result]
     assert state.evaluations == box.counts.evaluations == before.evaluations + 2
     assert all(np.array_equal(value, vars(before.agents)[name]) for name, value in vars(state.agents).items())

@@ -23,8 +23,7 @@ def test_plain_lines_come_now_and_then_and_at_the_end():
             display.update(standing(evaluations=100 * second, elapsed=float(second)))
         display.update(standing(10_000, 25.0, infeasible=3))
     lines = stream.getvalue().splitlines()
-    assert len(lines) == 4
-    assert lines[0].startswith("0 / 10 000 evaluations, 0:00, archive 4")
+    assert len(lines) == 4 and lines[0].startswith("0 / 10 000 evaluations, 0:00, archive 4")
     assert lines[-1] == "10 000 / 10 000 evaluations, 0:25, archive 4, flight time 109.1, speed 0.9, 3 infeasible"
     stream = io.StringIO()
     with SearchDisplay(stream=stream):

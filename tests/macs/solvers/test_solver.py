@@ -85,8 +85,7 @@ def test_a_callback_sees_progress_and_stops_the_search() -> None:
 
 def test_a_time_limit_keeps_what_was_found() -> None:
     front = MACS().solve(compiled("orbit_rise"), MESH, evaluations=10**6, seed=1, time_limit=0.5)
-    assert front.stats["stopped"] == "time limit"
-    assert not front.stats["reproducible"]
+    assert front.stats["stopped"] == "time limit" and not front.stats["reproducible"]
     assert len(front) > 0
     front = MACS().solve(compiled("goddard"), MESH, evaluations=12, seed=1, inner=Ipopt(seconds=1e-6))
     assert not front.stats["reproducible"]
@@ -132,8 +131,7 @@ def test_a_guess_is_among_the_first() -> None:
     problem = load("orbit_rise")
     problem.phases["rise"].guess(u=1.5, tf=50.0)
     front = MACS(mesh="fixed").solve(problem, MESH, evaluations=1, seed=1, inner="projection")
-    assert len(front) == 1
-    assert front[0].objectives["flight time"] == 50.0
+    assert len(front) == 1 and front[0].objectives["flight time"] == 50.0
     np.testing.assert_allclose(front[0].trajectory["rise"]["u"], 1.5)
 
 

@@ -52,8 +52,7 @@ def test_without_dispersion_it_is_the_nominal_passage(number):
     assert found.shield[0] == pytest.approx(nominal.shield[0], rel=RTOL)
     assert found.lowest[0] == pytest.approx(nominal.lowest[0] / 1e3, rel=RTOL)
     anew = with_solved_bank(design, NOMINAL)
-    assert anew.on_target[0]
-    assert anew.upward[0] == pytest.approx(nominal.lift[0], abs=RTOL)
+    assert anew.on_target[0] and anew.upward[0] == pytest.approx(nominal.lift[0], abs=RTOL)
 
 
 @pytest.mark.slow
