@@ -60,28 +60,12 @@ KNOWN: list[tuple[Preference, float, tuple[float, ...]]] = [
     (FuzzyGoal({"effort": 10.0, "time": 0.7}, aggregate="sum"), NOW["time"], ((NOW["time"] - 0.7) / 3.3, 0.0)),
     (FuzzyGoal({"effort": Around(30.0, 5.0), "time": 0.7}), NEARBY, ((NEARBY - 0.7) / 3.3, 0.0)),
     (ReferencePoint({"effort": 10.0, "time": 0.7}), HOPED, ((1 + 2e-4) * (HOPED - 0.7) / WIDE_T,)),
-    (
-        ReferencePoint({"effort": 40.0, "time": 2.0}),
-        (T := crossing((40, WIDE_E), (2, WIDE_T))),
-        ((1 + 2e-4) * (T - 2) / WIDE_T,),
-    ),
-    (
-        ReferencePoint({"effort": 10.0, "time": 0.7}, {"effort": 30.0, "time": 2.0}),
-        RESERVED,
-        ((1 + 2e-4) * (RESERVED - 0.7) / 1.3,),
-    ),
-    (
-        Nimbus(NOW, improve=["time"], until={"effort": 20.0}),
-        (T := in_time(20)),
-        ((T - 0.5) / WIDE_T + 1e-4 * sum(both(T)),),
-    ),
+    (ReferencePoint({"effort": 40.0, "time": 2.0}), (T := crossing((40, WIDE_E), (2, WIDE_T))), ((1 + 2e-4) * (T - 2) / WIDE_T,)),
+    (ReferencePoint({"effort": 10.0, "time": 0.7}, {"effort": 30.0, "time": 2.0}), RESERVED, ((1 + 2e-4) * (RESERVED - 0.7) / 1.3,)),
+    (Nimbus(NOW, improve=["time"], until={"effort": 20.0}), (T := in_time(20)), ((T - 0.5) / WIDE_T + 1e-4 * sum(both(T)),)),
     (Nimbus(NOW, to={"effort": 8.0}, free=["time"]), 4.0, ((12 / 64 - 8) / WIDE_E + 1e-4,)),
     # (1/2 + lambda) d_1 + (1/2 - lambda) d_2 where the order is not kept, and everywhere else: kappa is d_1 - d_2 of either sign.
-    (
-        FuzzySatisfactory({}, ["effort", "time"], 0.1),
-        (T := balanced(0.6 / WIDE_E, 0.4 / WIDE_T)),
-        (0.6 * both(T)[0] + 0.4 * both(T)[1],),
-    ),
+    (FuzzySatisfactory({}, ["effort", "time"], 0.1), (T := balanced(0.6 / WIDE_E, 0.4 / WIDE_T)), (0.6 * both(T)[0] + 0.4 * both(T)[1],)),
     (FuzzySatisfactory({}, ["time", "effort"], 0.0, ordered=True), DIAGONAL, (both(DIAGONAL)[1],)),
 ]
 """Preferences, the time of their optimum, and its values, all derived by hand from the front."""

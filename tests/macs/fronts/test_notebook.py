@@ -48,10 +48,7 @@ def test_a_front_is_its_table_and_a_picture():
     assert picture(page).std() > 0.01, "not blank"
 
 
-@pytest.mark.parametrize(
-    "front",
-    [empty(), empty(closest=None), black_box(0, 5), black_box(200, 3), flights(3, status=["failed"] * 3)],
-)
+@pytest.mark.parametrize("front", [empty(), empty(closest=None), black_box(0, 5), black_box(200, 3), flights(3, status=["failed"] * 3)])
 def test_every_front_can_be_shown(front):
     page = shown(front)
     assert picture(page).std() > 0.0 and len(cells(page)) <= 2 + 30 and front.message in "".join(page.itertext())
