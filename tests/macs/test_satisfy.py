@@ -24,10 +24,12 @@ def test_lambda_is_raised_until_the_order_is_kept() -> None:
     assert choice.message == "" and choice.preference == FuzzySatisfactory({}, ["time", "effort"], choice.history[-1].about["lambda"])
 
 
-def test_nothing_is_raised_where_the_order_is_kept_at_once() -> None:
+def test_nothing_is_raised_where_the_order_is_kept_at_once_or_a_limit_from_the_first() -> None:
     choice = satisfy(cart(), FuzzySatisfactory({}, ["effort", "time"]), ranges=RANGES, start=ends())
     assert len(choice.history) == 1 and choice.history[0].about["kappa"] < 0
     assert "kappa" in choice.table() and "lambda" in choice.table()
+    choice = satisfy(cart(), MESH, FuzzySatisfactory({}, ["time", "effort"], 0.0, ordered=True), ranges=RANGES, start=ends())
+    assert len(choice.history) == 1 and choice.objectives["time"] == pytest.approx(DIAGONAL, rel=1e-6)
 
 
 STEEP = Ranges({"effort": -1e4, "time": 0.5}, {"effort": 96.0, "time": 4.03})
@@ -55,11 +57,6 @@ def test_an_order_that_no_point_keeps_is_named() -> None:
     choice = satisfy(cart(), MESH, FuzzySatisfactory({}, ["effort", "time"]), ranges=ranges, start=ends())
     assert "no point was found that meets" in choice.message and "effort satisfied at least as time" in choice.message
     assert choice.history[-1].about["kappa"] > 0 and choice.objectives["time"] == pytest.approx(4.0, rel=1e-6)
-
-
-def test_an_order_that_is_a_limit_from_the_first() -> None:
-    choice = satisfy(cart(), MESH, FuzzySatisfactory({}, ["time", "effort"], 0.0, ordered=True), ranges=RANGES, start=ends())
-    assert len(choice.history) == 1 and choice.objectives["time"] == pytest.approx(DIAGONAL, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -32,10 +32,7 @@ def test_nondominated_rows_are_those_that_no_other_row_dominates(F):
     dominated = dominates(F[:, None], F[None]).any(axis=0)
     first = np.isin(np.arange(len(F)), np.unique(F, axis=0, return_index=True)[1])
     assert np.array_equal(keep, ~dominated & first)
-
-
-@given(FRONTS)
-def test_dominance_is_weak_dominance_without_equality(F):
+    # Dominance is weak dominance without equality.
     strict, weak = dominates(F[:, None], F[None]), (F[:, None] <= F[None]).all(axis=-1)
     equal = (F[:, None] == F[None]).all(axis=-1)
     assert np.array_equal(strict, weak & ~equal) and not (strict & strict.T).any()

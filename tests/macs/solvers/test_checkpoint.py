@@ -137,14 +137,11 @@ def test_a_trajectory_problem_goes_on_to_the_same_bits(file, solver, evaluations
     assert_same(solve(solver, evaluations, checkpoint=file), solve(solver, evaluations))
 
 
-def test_a_checkpoint_changes_no_bit(file, monkeypatch) -> None:
+def test_a_checkpoint_changes_no_bit_and_a_finished_one_needs_no_evaluations(file, monkeypatch) -> None:
     monkeypatch.setattr(checkpoint, "WRITE_SECONDS", 0.0)
     monkeypatch.setattr(checkpoint, "WRITE_SHARE", 0.0)
-    assert_same(minimize(checkpoint=file), uninterrupted())
-
-
-def test_a_finished_run_returns_its_front_without_evaluations(file) -> None:
     first, counted = minimize(checkpoint=file), Counted()
+    assert_same(first, uninterrupted())
     again = minimize(checkpoint=file, f=counted)
     assert counted.rows == 0
     assert_same(again, first)
