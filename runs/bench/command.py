@@ -20,7 +20,7 @@ from .growth import GENERATION, SCALE
 from .inner import INNER, POPULATION
 from .parts import PARTS_BENCH
 from .peers import PEERS
-from .published import METHODS, STANDARD
+from .published import METHODS, STANDARD, WILD
 from .searches import FRONT, SEARCH
 from .study import STUDY
 
@@ -37,6 +37,7 @@ BENCHES: dict[str, Bench] = {
     "search": SEARCH,
     "standard": STANDARD,
     "study": STUDY,
+    "wild": WILD,
 }
 
 

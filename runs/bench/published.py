@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from ..execution.processes import CRASHED, TIMEOUT, lines_apart
 from ..execution.task import peak_memory
 from .contract import ASKED, Bench, Column, Effort, Row, Target, column
 
+ASKED_ABOUT = tuple(name for name, (address, _) in cases().items() if ".wild:" in address)
+"""Problems that others asked about, which are no part of `macs bench standard`."""
 RIGHT, WRONG, UNVERIFIED, FAILED = "right", "WRONG", "not verified", "FAILED"
 
 
@@ -104,7 +107,7 @@ STANDARD = Bench(
     about="PUBLISHED PROBLEMS: the optimum that the defaults find, against the published one. Error: of the value as simulated, relative "
     f"to the published one, or to its scale; right within {SHARE:g}, or what the published digits are good for. Violation: largest "
     "one when simulated. Not verified: said so by the program itself. Seconds: from the statement to the solution.",
-    full=Effort(tuple(cases()), seconds=300.0),
+    full=Effort(tuple(name for name in cases() if name not in ASKED_ABOUT), seconds=300.0),
     quick=Effort(("linear_tangent", "breakwell", "moon_landing", "schwartz"), seconds=300.0),
     prepare=default_rounds,
     columns=(
@@ -117,6 +120,14 @@ STANDARD = Bench(
         column("MB", "", "memory"),
     ),
     targets=default_targets,
+)
+
+WILD = replace(
+    STANDARD,
+    title="problems that others asked about",
+    about=f"FROM THE WILD: each stands for a kind that was wrong once. {STANDARD.about}",
+    full=Effort(ASKED_ABOUT, seconds=300.0),
+    quick=Effort(("thrift", "rail", "layers"), seconds=300.0),
 )
 
 

@@ -55,6 +55,7 @@ standard    every published problem with defaults, each in a process of its own:
 uf          UF1 to UF10 of CEC 2009, likewise: IGD as in the competition
 zdt         ZDT1-4 and 6, likewise
 study       a study with two processes against one, and how much longer it takes than its runs do
+wild        the same as standard for problems that others asked about: each stands for a kind that was wrong once
 
 What is asked is printed beside the measured values, and judged by medians of rounds or seeds. The exit code is 1 where anything is missed.
 Ctrl-C prints the values measured so far. MACS_COMPILE=0 keeps functions from being compiled; where there is a C compiler, the benchmark of

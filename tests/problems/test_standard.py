@@ -62,7 +62,7 @@ QUICK = {
 }
 """By mesh."""
 # Not here, since no uniform mesh of a sensible size finds them from one start: alp_rider, dubins, f8 (from its own guess),
-# free_flying_robot, low_thrust, obstacle and rocket; test_standard_truths.py has independent references of most.
+# free_flying_robot, low_thrust, obstacle, rocket and the `wild` ones; test_standard_truths.py has independent references of most.
 SLOW = {
     "dfet:20x3": "dynamic_soaring missile",
     "dfet:20x3:bernstein": "tuberculosis",

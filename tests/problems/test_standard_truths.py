@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_bvp, solve_ivp
+from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
 from macs import optimize
@@ -402,3 +403,33 @@ def test_a_flight_of_less_fuel_than_the_published_one():
             durations = durations - np.linalg.pinv(slopes) @ missed(durations)
         assert np.abs(missed(durations)).max() < 1e-8 and (durations > 0).all()
         assert durations @ np.abs(pairs).sum(axis=1) == pytest.approx(fuel, abs=1e-7)
+
+
+def test_springs_take_the_effort_of_the_gramian():
+    """Least effort to bring a linear system from a state to rest: y' W^-1 y, with the state y that it would reach by itself."""
+    for record in published("springs"):
+        n = record.data.get("masses", 2)
+        chain = -2 * np.eye(n) + np.eye(n, k=1) + np.eye(n, k=-1)
+        chain[-1, -1] = -1
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [chain, np.zeros((n, n))]])
+        push = np.eye(2 * n)[-1]
+        # W = integral of exp(A t) b b' exp(A' t), from the exponential of one matrix (Van Loan 1978).
+        whole = expm(np.block([[-A, np.outer(push, push)], [np.zeros_like(A), A.T]]) * 40.0)
+        transition = whole[2 * n :, 2 * n :].T
+        W, y = transition @ whole[: 2 * n, 2 * n :], transition[:, 0]
+        assert y @ np.linalg.solve(W, y) == pytest.approx(record.value, rel=1e-6)
+
+
+def test_a_mountain_car_switches_twice():
+    def time(first: float, second: float) -> float:
+        y, passed = np.array([-0.5, 0.0]), 0.0
+        goal = lambda t, y: y[0] - 0.5  # noqa: E731
+        goal.terminal = True
+        for u, duration in ((1, first), (-1, second), (1, 300.0)):
+            arc = solve_ivp(lambda t, y, u=u: [y[1], 0.001 * u - 0.0025 * np.cos(3 * y[0])], (0, duration), y, events=goal, **TIGHT)
+            y, passed = arc.y[:, -1], passed + arc.t[-1]
+        return passed
+
+    best = 14.64628942, 37.80285988
+    assert time(*best) == pytest.approx(published("mountain_car")[0].value, abs=1e-7)
+    assert all(time(best[0] + a, best[1] + b) > time(*best) for a, b in ((0.1, 0), (-0.1, 0), (0, 0.1), (0, -0.1)))
