@@ -228,6 +228,7 @@ MET_AND_MISSED = [
     ("study", study_rows(1.7, 0.05), 0),
     ("study", study_rows(1.69, 0.05), 1),
     ("study", study_rows(1.7, 0.051), 1),
+    ("wild", verdict_rows(*["right"] * 8, optima.WRONG), 2),
 ]
 """Rows, and how many targets they miss."""
 
