@@ -17,6 +17,8 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import casadi as ca
 import numpy as np
 
+from .switching import Switching
+
 Owner = TypeVar("Owner", bound="Deriving")
 Further = ParamSpec("Further")
 Result = TypeVar("Result")
@@ -249,6 +251,8 @@ class CompiledPhase(Deriving):
     """... whether they are roots, ..."""
     size_scales: tuple[float, ...] = ()
     """... and how large they mostly are within the bounds."""
+    switching: Switching | None = None
+    """Where rates, integrands, path constraints or peaks may jump."""
 
     def __repr__(self) -> str:
         names = ([v.name for v in group] for group in (self.states, self.controls))

@@ -10,6 +10,7 @@ import casadi as ca
 from . import checks
 from .absolute import absolute_terms, radicand
 from .compiled import CompiledPhase, Limit, Variable, vector_function
+from .switching import switching
 
 _KINDS = ("initial", "final", "integral", "peak")
 
@@ -255,6 +256,9 @@ class Phase:
         roots = {row: inner for row, inner in enumerate(map(radicand, integrands)) if inner is not None}
         sizes = roots | {row: expr.dep(0) for row, expr in enumerate(integrands) if expr.is_op(ca.OP_FABS)}
 
+        varying = [*self._rates.values(), *(expr for _, expr in self._paths.values()), *integrands]
+        varying += [expr for _, expr in self._quantities["peak"]]
+
         return CompiledPhase(
             name=self.name,
             time_unit=self._time_unit,
@@ -275,5 +279,6 @@ class Phase:
             peaks=function("peaks", [expr for _, expr in self._quantities["peak"]]),
             sizes=function("sizes", list(sizes.values())),
             sized=tuple(sizes),
+            switching=switching(groups, varying, [self.time, self.t0, self.tf]),
             roots=tuple(row in roots for row in sizes),
         )

@@ -229,7 +229,7 @@ def _with_parameters(phase: CompiledPhase, own: int, more: int) -> CompiledPhase
 
     names = ("dynamics", "path", "initials", "finals", "integrands", "peaks", "sizes")
     functions: dict[str, Any] = {name: widened(getattr(phase, name)) for name in names}
-    return replace(phase, **functions)
+    return replace(phase, **functions, switching=None)
 
 
 def _new(name: str, taken: Container[str]) -> str:

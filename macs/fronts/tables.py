@@ -15,7 +15,7 @@ from transcription.trajectories.costates import hamiltonian_variation
 
 from ..evaluation.evaluator import CONVERGED
 from ..io.text import call, counted, duration, html_block, html_table, numbers, text_table
-from .verified import AGAIN, MISSES, constant_objectives, objective_scales
+from .verified import AGAIN, MISSES, constant_objectives, objective_scales, untrusted
 
 if TYPE_CHECKING:
     from .point import Point
@@ -241,7 +241,9 @@ def _simulated(front: Points) -> list[str]:
     if count == len(front):
         how = "evaluated again" if _is_vector(front) else "simulated by an independent integrator"
         return [f"{points} verified: {how}, nothing differs by more than {verify:g}."]
-    remedy = "" if _is_vector(front) else " front.mended() solves again where points miss something."
+    remedy = (
+        "" if _is_vector(front) or untrusted(front)[~front.verified].all() else " front.mended() solves again where points miss something."
+    )
     if not count:
         return [("The point is not verified." if len(front) == 1 else f"None of {len(front)} points is verified.") + remedy]
     return [f"{count} of {counted(len(front), 'point')} {'is' if count == 1 else 'are'} verified.{remedy}"]

@@ -12,12 +12,14 @@ from problems.compiled import CompiledProblem, Limit, Variable
 from problems.sampling import objective_spreads
 from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.stopping import Stopped
+from transcription.trajectories.jumps import UNTRUSTED
 from transcription.trajectories.limits import excess
 from transcription.trajectories.simulate import Simulation, simulate_all, simulate_elements, worst_violation
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.blackbox import evaluated_again
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
+from ..io.text import counted
 from ..pareto.dominance import CONSTANT, objective_units, stated_scales
 from .points import Points
 from .provenance import AnyCompiled
@@ -65,6 +67,7 @@ class Independent(NamedTuple):
     worst: list[str]  # the constraint that each point violates most
     violations: Sequence[Mapping[str, float] | None]  # of all constraints
     diverged: dict[int, str]  # where the simulation of a point has no finite states any more
+    jumps: dict[int, str]  # where rates jump, so that derivatives do not say what is optimal
 
     def off(self, points: Points, scales: np.ndarray) -> np.ndarray:
         """Differences (n, m) of objectives, in `scales` (m,)."""
@@ -75,13 +78,16 @@ class Independent(NamedTuple):
 def simulated_independently(points: Points, simulate: Callable[[list[Trajectory]], Sequence[Simulation]]) -> Independent:
     """The points as `simulate` gives them."""
     problem, (n, m) = points.compiled(), points.F.shape
-    found = Independent(np.full((n, m), np.nan), np.full(n, np.nan), np.full(n, np.nan), [""] * n, points.violations, {})
+    found = Independent(np.full((n, m), np.nan), np.full(n, np.nan), np.full(n, np.nan), [""] * n, points.violations, {}, {})
     flown = {i: trajectory for i, trajectory in enumerate(points.trajectories) if trajectory is not None}
     for i, simulation in zip(flown, simulate([*flown.values()]), strict=True):
         found.worst[i], found.violation[i] = worst_violation(problem, simulation)
         found.defect[i], found.F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
         if not np.isfinite(simulation.max_defect):
             found.diverged[i] = _divergence(simulation)
+        if simulation.jumps:
+            others = len(simulation.jumps) - 1
+            found.jumps[i] = str(simulation.jumps[0]) + (f" ({counted(others, 'more jump')})" if others else "")
     return found
 
 
@@ -102,7 +108,7 @@ def evaluated_independently(points: Points) -> Independent:
     assert isinstance(problem, CompiledVectorProblem)
     F, violation, violations = evaluated_again(problem, points.decision)
     return Independent(
-        F, np.zeros(len(F)), violation, [max(one, key=lambda name: one[name], default="") for one in violations], violations, {}
+        F, np.zeros(len(F)), violation, [max(one, key=lambda name: one[name], default="") for one in violations], violations, {}, {}
     )
 
 
@@ -134,6 +140,7 @@ def verified(
     scales = objective_scales(points) if scales is None else scales
     off, allowed = found.off(points, scales), _allowed(points, tolerance)
     agrees = (points.status == CONVERGED) & (found.defect <= tolerance) & (found.violation <= allowed) & (off <= tolerance).all(axis=1)
+    agrees[list(found.jumps)] = False
     notes = [_without_misses(note) for note in points.notes]
     for i in np.flatnonzero(~agrees & ~np.isnan(found.violation)):
         reasons = _misses(points, int(i), found, off[i], tolerance, allowed, remark)
@@ -170,7 +177,7 @@ def _misses(points: Points, i: int, found: Independent, off: np.ndarray, toleran
     if not off.max() <= tolerance:
         k = int(np.where(np.isfinite(off), off, -1.0).argmax())
         reasons.append(f"its '{points.names[k]}' differs by {abs(found.F[i, k] - points.F[i, k]):.2g} {points.goals[k].unit}".rstrip())
-    return reasons
+    return [*reasons, *([found.jumps[i]] if i in found.jumps else [])]
 
 
 def feasible_as_simulated(points: Points, tolerance: float) -> np.ndarray:
@@ -182,6 +189,11 @@ def feasible_as_simulated(points: Points, tolerance: float) -> np.ndarray:
         & (points.defect <= tolerance if points.dynamic else True)
         & (points.simulated_violation <= _allowed(points, tolerance))
     )
+
+
+def untrusted(points: Points) -> np.ndarray:
+    """Mask (n,) of the points with a jump along their trajectories, which no other mesh cures."""
+    return np.array([UNTRUSTED in note for note in points.notes], dtype=bool)
 
 
 def with_nearest(points: Kind) -> Kind:

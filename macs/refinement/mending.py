@@ -20,7 +20,7 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.builders import best_rows, certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, verified
+from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, untrusted, verified
 from ..gradients.front_polish import KEPT_INSIDE, back_off
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal
 from ..io.console import working
@@ -205,7 +205,7 @@ class _Mending:
 
     def _meshed(self, points: Points, rows: np.ndarray) -> list[int]:
         """Those of a mask of rows (n,) that can be solved on other meshes."""
-        rows = rows & (points.status == CONVERGED)
+        rows = rows & (points.status == CONVERGED) & ~untrusted(points)
         return [i for i in np.flatnonzero(rows).tolist() if isinstance(from_dict(points[i].transcription or {}), Meshed)]
 
     def _refined(self, points: Points, rows: list[int], fine: Meshed | None) -> Points:

@@ -10,6 +10,7 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered, verified_scale
 
 from .arcs import METHODS, Arcs
+from .jumps import Jump, jumps
 from .limits import DENSE, Course, excess
 from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
@@ -35,6 +36,8 @@ class Simulation:
         The simulated one.
     quantities : tuple of arrays
         What objectives and constraints see of each phase.
+    jumps : tuple of Jump
+        Where rates, integrands, path constraints or peaks jump because a state or control crosses something.
 
     Examples
     --------
@@ -52,6 +55,7 @@ class Simulation:
     objectives: Mapping[str, float]
     trajectory: Trajectory
     quantities: tuple[np.ndarray, ...]
+    jumps: tuple[Jump, ...] = ()
 
     def __repr__(self) -> str:
         objectives = ", ".join(f"'{name}': {value:g}" for name, value in self.objectives.items())
@@ -161,17 +165,19 @@ def _simulation(
         objectives={goal.name: float(value) for goal, value in zip(problem.goals, objectives, strict=True)},
         trajectory=Trajectory(tuple(simulated[i].trajectory for i in range(len(problem.phases))), planned.parameters),
         quantities=tuple(quantities),
+        jumps=tuple(jump for i in problem.order_in_time for jump in simulated[i].jumps),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _SimulatedPhase:
-    """One phase as planned and as simulated, its quantities q, and the excess of its states, controls and paths."""
+    """One phase as planned and as simulated, its quantities q, the excess of its states, controls and paths, and its jumps."""
 
     planned: PhaseTrajectory
     trajectory: PhaseTrajectory
     quantities: np.ndarray
     excess: np.ndarray
+    jumps: list[Jump]
 
     def defect(self, phase: CompiledPhase) -> dict[str, float]:
         # At an end of two elements the trajectory has two values where each element is simulated by itself.
@@ -264,7 +270,7 @@ def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: n
     initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
     finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
     quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], highest.max(axis=0)])
-    return _SimulatedPhase(planned, trajectory, quantities, beyond.max(axis=0))
+    return _SimulatedPhase(planned, trajectory, quantities, beyond.max(axis=0), jumps(phase, course))
 
 
 def _or_infinite(value: float) -> float:
