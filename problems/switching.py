@@ -21,24 +21,13 @@ DEEP, LONGEST = 100, 80
 
 @dataclass(frozen=True, eq=False)
 class Switching:
-    """The k switches of a phase, with which its rates, integrands, path constraints or peaks may jump.
+    """The k switches of a phase, with which its rates, integrands, path constraints or peaks may jump."""
 
-    Parameters
-    ----------
-    labels : tuple of str
-        The expressions that switch, in the user's names.
-    differences : tuple of str
-        What is 0 where they switch; empty for roundings.
-    states : ca.Function
-        (x, u, t, s) -> for each switch a number that changes where it switches (k), its value (k), and its difference (k), 1 without one.
-    sides : ca.Function
-        (x, u, t, s, w) -> all rows that may jump, with the values w (k) of the switches.
-    """
-
-    labels: tuple[str, ...]
+    labels: tuple[str, ...]  # labels, differences: What switches, in the user's names, and what is 0 there; empty for roundings
     differences: tuple[str, ...]
+    # (x, u, t, s) -> a number that changes where each switches, its value, and its difference, or 1 without one: (3 k)
     states: ca.Function
-    sides: ca.Function
+    sides: ca.Function  # (x, u, t, s, w) -> all rows that may jump, with the values w (k) of the switches
 
 
 def switching(groups: Mapping[str, Sequence[ca.MX]], expressions: Sequence[ca.MX], known: Sequence[ca.MX]) -> Switching | None:

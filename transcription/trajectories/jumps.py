@@ -25,25 +25,14 @@ BISECTIONS = 48
 
 @dataclass(frozen=True)
 class Jump:
-    """A place where something jumps.
-
-    Parameters
-    ----------
-    phase : str
-    time : float
-    time_unit : str
-    expression, difference : str
-        What switches there, in the user's names, and what is 0 there (empty for a rounding).
-    how : str
-        "crosses", or "touches or slides along" where the difference is 0 without a change of sign.
-    """
+    """A place where something jumps."""
 
     phase: str
     time: float
     time_unit: str
-    expression: str
+    expression: str  # expression, difference: What switches there, in the user's names, and what is 0 there (empty for a rounding)
     difference: str
-    how: str
+    how: str  # "crosses", or "touches or slides along" where the difference is 0 without a change of sign
 
     def __str__(self) -> str:
         where = f"phase '{self.phase}' has a jump at t = {self.time:.5g} {self.time_unit}".rstrip()

@@ -43,19 +43,10 @@ def paths_and_peaks(
 
 
 class Course:
-    """All that is limited along one phase, and its peaks: q columns of states, controls, path constraints and peaks.
+    """All that is limited along one phase of N elements, and its peaks: q columns of states, controls, path constraints and peaks.
 
-    Parameters
-    ----------
-    state
-        The polynomials of the states, of N elements; those of the controls are `trajectory`'s.
-    s : array (ns,)
-        t0, tf and the parameters.
-
-    Attributes
-    ----------
-    values, between : array (N, len(DENSE), q), array (N, len(GAPS), q)
-        Of the columns at the samples and in the middle of the gaps between them.
+    `state` has the polynomials of the states, `trajectory` those of the controls, `s` (ns,) t0, tf and the parameters; `values`
+    (N, len(DENSE), q) are those at the samples, `between` (N, len(GAPS), q) in the middle of the gaps between them.
     """
 
     def __init__(self, phase: CompiledPhase, state: PiecewisePolynomial, trajectory: PhaseTrajectory, s: np.ndarray) -> None:
