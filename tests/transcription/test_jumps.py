@@ -47,7 +47,6 @@ def further(rate):
         (lambda x, u, t: NESTED.expand()(x - 0.1 * t) * x, 0.75, "(0.3-(x-(0.1*t)))"),
         (lambda x, u, t: ca.sign(x - 0.3), 0.6, "sign((x-0.3))"),
         (lambda x, u, t: ca.floor(10 * x + 5.5), 0.1, "floor"),
-        (lambda x, u, t: ca.fmod(x, 0.3), 0.6, "fmod(x,0.3)"),
         (lambda x, u, t: ca.conditional(ca.floor(2.5 * x), [1.0, 2.0], 3.0), 0.8, "floor((2.5*x))"),
     ],
 )
