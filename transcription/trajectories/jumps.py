@@ -78,10 +78,10 @@ class _Line:
         left, right, each = gap.astype(float), gap + 1.0, np.arange(len(gap))
         for _ in range(STEPS):
             middle = 0.5 * (left + right)
-            before = self._switches(*self._at(gap, middle))[0][each, switch] == self.sides[gap, switch]
-            left, right = np.where(before, middle, left), np.where(before, right, middle)
-        sides = [self._switches(*self._at(gap, place))[0] for place in (left, right)]
-        return self._jumping(*self._at(gap, right), *sides, switch, "crosses")
+            same = self._switches(*self._at(gap, middle))[0][each, switch] == self.sides[gap, switch]
+            left, right = np.where(same, middle, left), np.where(same, right, middle)
+        before, after = (self._switches(*self._at(gap, place))[0] for place in (left, right))
+        return self._jumping(self._at(gap, right), before, after, switch, "crosses")
 
     def touches(self) -> list[tuple[float, int, str]]:
         """Time and switch wherever a difference is nearly 0 without a change of its sign, and something is another on the other side."""
@@ -105,15 +105,15 @@ class _Line:
         # The other side of a comparison, 0 or 1, and of a sign, -1 or 1.
         far[each, switch] = np.where(now == 0.0, 1.0, np.where(self.sides.min(axis=0)[switch] < 0.0, -now, 0.0))
         near = np.abs(differences)[each, switch] <= TOUCHES * size.max(axis=0)[switch]
-        found = self._jumping(*(one[near] for one in (values, times, sides, far, switch)), "touches or slides along")
+        found = self._jumping((values[near], times[near]), sides[near], far[near], switch[near], "touches or slides along")
         return list({switch: (time, switch, how) for time, switch, how in sorted(found, reverse=True)}.values())
 
     def _jumping(
-        self, values: np.ndarray, times: np.ndarray, one: np.ndarray, other: np.ndarray, switch: np.ndarray, how: str
+        self, at: tuple[np.ndarray, np.ndarray], one: np.ndarray, other: np.ndarray, switch: np.ndarray, how: str
     ) -> list[tuple[float, int, str]]:
         """Times and switches (n,) of those places where something jumps between two sets of values of the switches (n, k)."""
-        change = np.abs(self._rows(values, times, one) - self._rows(values, times, other)) / self.scales
-        return [(float(times[i]), int(switch[i]), how) for i in np.flatnonzero((change > SMALLEST_JUMP).any(axis=1))]
+        change = np.abs(self._rows(*at, one) - self._rows(*at, other)) / self.scales
+        return [(float(at[1][i]), int(switch[i]), how) for i in np.flatnonzero((change > SMALLEST_JUMP).any(axis=1))]
 
     def _switches(self, values: np.ndarray, times: np.ndarray) -> list[np.ndarray]:
         """Values of the switches, and their differences, both (n, k)."""
