@@ -13,8 +13,6 @@ import numpy as np
 
 COMPARISONS = (ca.OP_LT, ca.OP_LE)
 STEPPED = (*COMPARISONS, ca.OP_SIGN, ca.OP_EQ, ca.OP_NE, ca.OP_FLOOR, ca.OP_CEIL)
-DEEP, LONGEST = 100, 80
-"""How deep expressions are compared; characters of one that is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +73,7 @@ def _open(function: ca.Function) -> bool:
 
 def same(one: ca.MX, other: ca.MX) -> bool:
     """Whether two expressions are made of the same operations."""
-    return bool(one.op() == other.op() and one.shape == other.shape and ca.is_equal(one, other, DEEP))
+    return bool(one.op() == other.op() and one.shape == other.shape and ca.is_equal(one, other, 100))
 
 
 def _difference(node: ca.MX) -> ca.MX | None:
@@ -88,7 +86,7 @@ def _difference(node: ca.MX) -> ca.MX | None:
 def _text(expression: ca.MX) -> str:
     """An expression in the user's names, or, if that is long, what it is of."""
     text = str(expression)
-    return text if len(text) <= LONGEST else f"an expression of {', '.join(sorted({symbol.name() for symbol in ca.symvar(expression)}))}"
+    return text if len(text) <= 80 else f"an expression of {', '.join(sorted({symbol.name() for symbol in ca.symvar(expression)}))}"
 
 
 def nodes(expression: ca.MX) -> list[ca.MX]:

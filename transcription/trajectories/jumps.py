@@ -12,16 +12,12 @@ import numpy as np
 from problems.compiled import CompiledPhase, remembered
 
 from ..numerics.batched import Batched, expanded
-from .limits import DENSE, Course
+from .limits import DENSE, NEGLIGIBLE_EXCESS, Course
 
 UNTRUSTED = "the optimum is not to be trusted"
 """Words by which a jump is known in a point's note: no finer mesh cures it."""
 SMALLEST_JUMP = 1e-4
 """Part of the largest value of a rate along the trajectory up to which it does not jump: `fabs`, `fmin`, `fmax` only have kinks."""
-TOUCHES = 1e-6
-"""Part of its largest value along the trajectory up to which the difference of a comparison counts as 0."""
-STEPS = 60
-"""In which a place between samples is found to the last digits."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +72,7 @@ class _Line:
         if not len(gap):
             return []
         left, right, each = gap.astype(float), gap + 1.0, np.arange(len(gap))
-        for _ in range(STEPS):
+        for _ in range(60):
             middle = 0.5 * (left + right)
             same = self._switches(*self._at(gap, middle))[0][each, switch] == self.sides[gap, switch]
             left, right = np.where(same, middle, left), np.where(same, right, middle)
@@ -95,7 +91,7 @@ class _Line:
         def at(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return self._at(np.minimum(places.astype(int), len(size) - 2), places)
 
-        for _ in range(STEPS):
+        for _ in range(60):
             one, other = left + (right - left) / 3.0, right - (right - left) / 3.0
             nearer = np.less_equal(*(np.abs(self._switches(*at(places))[1])[each, switch] for places in (one, other)))
             left, right = np.where(nearer, left, one), np.where(nearer, other, right)
@@ -104,7 +100,7 @@ class _Line:
         far, now = sides.copy(), sides[each, switch]
         # The other side of a comparison, 0 or 1, and of a sign, -1 or 1.
         far[each, switch] = np.where(now == 0.0, 1.0, np.where(self.sides.min(axis=0)[switch] < 0.0, -now, 0.0))
-        near = np.abs(differences)[each, switch] <= TOUCHES * size.max(axis=0)[switch]
+        near = np.abs(differences)[each, switch] <= NEGLIGIBLE_EXCESS * size.max(axis=0)[switch]
         found = self._jumping((values[near], times[near]), sides[near], far[near], switch[near], "touches or slides along")
         return list({switch: (time, switch, how) for time, switch, how in sorted(found, reverse=True)}.values())
 

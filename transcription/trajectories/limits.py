@@ -22,8 +22,6 @@ MIDDLES, SLOPES = lagrange_matrix(DENSE, TWICE[len(DENSE) :]), lagrange_derivati
 """Values in the middles, and slopes at the places, of polynomials through values at the places."""
 CLOSER = 17
 """Samples of a gap that is looked at closer."""
-NEGLIGIBLE_RISE = 1e-8
-"""By how much less than this, in scales, a value may rise between samples is not looked for."""
 NEGLIGIBLE_EXCESS = 1e-6
 """Excursions up to this, in scales, are those of a feasible point's tolerance."""
 
@@ -96,7 +94,7 @@ class Course:
             top, beside = closer[each, best], np.array([np.maximum(best - 1, 0), np.minimum(best + 1, CLOSER - 1)])
             np.maximum.at(largest, (element, column), top)
             hope = 0.5 * (top - closer[each, beside].min(axis=0))
-            kept = (top + hope > np.maximum(largest[element, column], floor[column])) & (hope > NEGLIGIBLE_RISE * units[column])
+            kept = (top + hope > np.maximum(largest[element, column], floor[column])) & (hope > 0.01 * NEGLIGIBLE_EXCESS * units[column])
             left, right = tau[each, beside][:, kept]
             element, column = element[kept], column[kept]
         largest[:, np.flatnonzero(self.free)] = 0.0
