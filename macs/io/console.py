@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar, Token
+from io import StringIO
 from types import TracebackType
 from typing import Any, Self, TextIO
 
@@ -33,7 +34,7 @@ class Display(AbstractContextManager, ABC):
     """Whether the display is removed from a terminal at the end."""
 
     def __init__(self, shown: bool | None = True, stream: TextIO | None = None) -> None:
-        self._stream = stream or sys.stderr
+        self._stream = stream or sys.stderr or StringIO()
         self._shown = is_live(self._stream) if shown is None else shown
         self._delay = SHOWN_AFTER if shown is None else 0.0
         self._live: Any = None
@@ -88,7 +89,7 @@ class Display(AbstractContextManager, ABC):
         from rich.console import Console
         from rich.live import Live
 
-        console = Console(file=self._stream)
+        console = Console(file=getattr(self._stream, "beneath", self._stream))  # the command line shows control characters of others
         self._live = Live(console=console, refresh_per_second=8, transient=self.transient, get_renderable=self.render)
         self._live.start()
 

@@ -1,23 +1,67 @@
-"""Exit codes of commands, the error for a wrong call, and signals: Ctrl-C before a command begins and after it has ended, SIGTERM as
-Ctrl-C."""
+"""Exit codes of commands, the error for a wrong call, streams, and signals: Ctrl-C before a command begins and after it has ended, SIGTERM
+as Ctrl-C."""
 
 from __future__ import annotations
 
+import errno
+import io
 import os
+import re
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
 DONE, FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 """Exit codes: done; failed (nothing feasible, a check not passed, runs missing); the call was wrong; Ctrl-C."""
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Errors of a disk, for which the call is not to blame."""
+CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""Characters that a terminal obeys instead of showing them, but for ends of lines and tabulators."""
+
 
 class WrongCall(Exception):  # noqa: N818 - a message to the user in one line
     """The user's call is wrong. The text is the reason, in the user's words."""
+
+
+class Plain:
+    """A stream that shows control characters, such as a foreign file may have in its texts, and obeys none. If it is `patient`, it need not
+    be writable: what was to be said on it is lost."""
+
+    def __init__(self, beneath: Any, patient: bool = False) -> None:
+        self.beneath, self._patient = beneath, patient
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.beneath, name)
+
+    def write(self, text: str) -> int:
+        """As of any stream."""
+        with suppress(OSError) if self._patient else nullcontext():
+            self.beneath.write(CONTROLS.sub(lambda found: ascii(found[0])[1:-1], text))
+        return len(text)
+
+    def flush(self) -> None:
+        """As of any stream."""
+        with suppress(OSError) if self._patient else nullcontext():
+            self.beneath.flush()
+
+
+@contextmanager
+def streams() -> Iterator[None]:
+    """A context in which output and errors go to `Plain` streams; those that are closed lead nowhere."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115 - until the process ends
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # A unit that the terminal cannot show is no reason to fail.
+        sys.stdout.reconfigure(errors="replace")
+    with redirect_stdout(Plain(sys.stdout)), redirect_stderr(Plain(sys.stderr, patient=True)):
+        yield
 
 
 @contextmanager

@@ -230,7 +230,7 @@ def run_study(arguments: Namespace) -> int:
         print(error, file=sys.stderr)
         return FAILED
     except OSError as error:
-        raise WrongCall(f"{error.strerror or error}; {again}") from error
+        raise OSError(error.errno, f"{error.strerror or error}; {again}") from error
     print(f"{summary}\n\nin {out}")
     asked = [run for run in summary.runs if solvers is None or run.cell.solver in solvers]
     return DONE if all(run.finished for run in asked) else FAILED
@@ -256,13 +256,10 @@ def study_report(arguments: Namespace) -> int:
         if not (name and equals and path):
             raise WrongCall(f"--join {word}: write NAME=FILE")
         foreign.setdefault(name, []).append(path)
-    try:
-        with wrong_call_on_value_error():
-            page = page_of(arguments) if arguments.page else None
-            drawn = not arguments.no_figures
-            found = report(arguments.folder, foreign=foreign, figures=drawn, progress=True, trust=arguments.trust, page=page)
-    except OSError as error:
-        raise WrongCall(str(error)) from error
+    with wrong_call_on_value_error():
+        page = page_of(arguments) if arguments.page else None
+        drawn = not arguments.no_figures
+        found = report(arguments.folder, foreign=foreign, figures=drawn, progress=True, trust=arguments.trust, page=page)
     print(f"{found}\n\n{len(found.files)} files in {Path(arguments.folder) / FOLDER}")
     return DONE
 
@@ -292,11 +289,8 @@ def page_report(arguments: Namespace) -> int:
         out.parent.mkdir(exist_ok=True)
     elif out.suffix.lower() not in (".html", ".htm"):
         raise WrongCall(f"--html {out}: the name of a page ends with .html")
-    try:
-        with wrong_call_on_value_error():
-            write_page(source, out, trust=arguments.trust, progress=True)
-    except OSError as error:
-        raise WrongCall(str(error)) from error
+    with wrong_call_on_value_error():
+        write_page(source, out, trust=arguments.trust, progress=True)
     print(f"page in {out}")
     return DONE
 

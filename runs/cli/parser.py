@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import difflib
-import io
 import os
 import sys
 import warnings
@@ -17,7 +16,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
 
-from .answers import DONE, FAILED, INTERRUPTED, WrongCall, complain, deaf, ended_as_by_ctrl_c, ended_at_once
+from .answers import DONE, FAILED, FULL, INTERRUPTED, WRONG, WrongCall, complain, deaf, ended_as_by_ctrl_c, ended_at_once, streams
 
 EPILOG = """\
 examples:
@@ -127,7 +126,7 @@ class Version(argparse.Action):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command, by default that of this process, which then ends; returns its exit code."""
     try:
-        with ended_as_by_ctrl_c():
+        with streams(), ended_as_by_ctrl_c():
             return _answer(argv)
     except KeyboardInterrupt:
         complain("interrupted", "macs")
@@ -138,17 +137,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _answer(argv: Sequence[str] | None) -> int:
-    parser = build_parser()
-    arguments, unknown = parser.parse_known_args(argv)
-    if unknown:
-        arguments.parser.error(_unknown_option(unknown[0], arguments.parser))
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        # A unit that the terminal cannot show is no reason to fail.
-        sys.stdout.reconfigure(errors="replace")
-    # A warning, such as that of an old file, is one line, without the place in our code.
-    warnings.formatwarning = lambda message, *_: f"{arguments.parser.prog}: {message}\n"
+    program = "macs"
     try:
-        with ended_at_once(arguments.parser.prog):
+        arguments, unknown = build_parser().parse_known_args(argv)
+        program = arguments.parser.prog
+        if unknown:
+            arguments.parser.error(_unknown_option(unknown[0], arguments.parser))
+        # A warning, such as that of an old file, is one line, without the place in our code.
+        warnings.formatwarning = lambda message, *_: f"{program}: {message}\n"
+        with ended_at_once(program):
             from . import commands
 
         code = commands.COMMANDS[arguments.command](arguments)
@@ -158,15 +155,16 @@ def _answer(argv: Sequence[str] | None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
     except WrongCall as error:
-        return complain(str(error), arguments.parser.prog)
+        return complain(str(error), program)
     except OSError as error:
-        return complain(error.strerror or str(error), arguments.parser.prog)
+        complain(error.strerror or str(error), program)
+        return FAILED if error.errno in FULL else WRONG
     except (MemoryError, RuntimeError) as error:
         from ..execution.task import is_memory_error, memory_message
 
         if not is_memory_error(error):
             raise
-        complain(memory_message(error), arguments.parser.prog)
+        complain(memory_message(error), program)
         return FAILED
     return int(code)
 

@@ -389,3 +389,30 @@ def test_a_result_overwrites_no_file_of_another_kind(capsys, refused, tmp_path, 
     assert source.read_text(encoding="utf-8") == "print('mine')\n"
     same = str(tmp_path / "q.png")
     assert "would overwrite the front" in refused("solve", "goddard", "--out", same, "--plot", same)
+
+
+def test_a_terminal_obeys_no_text_of_a_file(capsys):
+    front = flights(3)
+    front.message = "\x1b[31mred\u202e\x9b2J"
+    front.save("red.nc")
+    assert main(["show", "red.nc"]) == 0 and main(["show", "\x1b[31mgone.nc"]) == 2
+    said = capsys.readouterr()
+    assert not re.search("[\x1b\u202e\x9b]", said.out + said.err)
+    assert "\\x1b[31mred\\u202e\\x9b2J" in said.out and "\\x1b[31mgone.nc" in said.err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_streams_that_are_closed_or_full(here, monkeypatch):
+    flights(3).save("front.nc")
+    with monkeypatch.context() as closed:
+        for name in ("stdin", "stdout", "stderr"):
+            closed.setattr(sys, name, None)
+        assert main(["show", "front.nc"]) == 0 and main(["show", "gone.nc"]) == 2
+    with monkeypatch.context() as full, Path("/dev/full").open("w") as out, Path("/dev/full").open("w") as words:
+        full.setattr(sys, "stderr", words)
+        assert main(["show", "gone.nc"]) == 2
+        full.setattr(sys, "stdout", out)
+        assert main(["show", "front.nc"]) == 1, "the call was right"
+        for one in (out, words):  # what is left in them cannot be written when they are closed
+            with pytest.raises(OSError, match="No space"):
+                one.close()
