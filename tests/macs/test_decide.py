@@ -344,16 +344,6 @@ def test_same_seed_same_bits() -> None:
     assert one.point.decision.tobytes() == other.point.decision.tobytes() and one.value == other.value
 
 
-@pytest.mark.slow
-def test_two_phases_of_a_skip_entry() -> None:
-    problem = load("skip")
-    choice = decide(problem, ReferencePoint({"terminal mass": 60000.0}), starts=1)
-    assert choice.message == "" and choice.point.verified and choice.point.optimality < 1e-6
-    a, b = (1 - degree for degree in choice.degrees.values())
-    # The kink of the largest distance: both are equal there.
-    assert a == pytest.approx(b, abs=1e-6) and np.isfinite(choice.value)
-
-
 # Hard limits that cannot be met, and arguments that make no sense
 
 

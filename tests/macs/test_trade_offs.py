@@ -13,7 +13,7 @@ from macs.decisions.trade_offs import TradeOffs, rates
 from macs.fronts.builders import from_vectors
 from problems import Problem, load
 from problems.cases import goddard
-from transcription import DFET, NLP, Transcription, parse, stated
+from transcription import DFET, NLP, Transcription, parse
 from transcription.inner import inner_solver
 from transcription.nlp.derivatives import gradients
 from transcription.nlp.optimality import Linearised
@@ -322,27 +322,6 @@ def test_rates_of_three_objectives_agree_with_differences_of_other_optima():
     for name, shift in (("time", (h, 0.0)), ("distance", (0.0, h))):
         less, more = (optimum(problem, method, 2.0 + s * shift[0], 1.5 + s * shift[1])[0].objectives["effort"] for s in (-1, 1))
         assert found.rate("effort", name) == pytest.approx((more - less) / (2 * h), rel=1e-3)
-
-
-@pytest.mark.slow
-def test_rates_of_the_skip_entry_agree_with_differences_of_epsilon_constraint_optima():
-    """The greatest mass at speeds a little to both sides of each point's."""
-    problem = load("skip")
-    method = stated(problem.default_transcription)
-    nlp = method.nlp(problem)
-    front = sweep(problem, method, points=6, method="epsilon", starts=1, verify=None)
-    assert len(front) == 6
-    for point in front[1:-1]:
-        shifts = 0.002 * np.ptp(front.F[:, 1]) * np.array([-1.0, 1.0])
-        both = [
-            scalarize(nlp, point.decision, reference=np.array([0.0, point.F[1] + shift]), weights=np.array([1.0, 0.0])) for shift in shifts
-        ]
-        assert all(one.status == "converged" for one in both)
-        (mass, speed) = both[1].F - both[0].F
-        found = trade_offs(point)
-        assert found.rate("terminal mass", "terminal speed") == pytest.approx(mass / speed, rel=0.02)
-        assert found.matrix[1, 0] == pytest.approx(mass / speed, rel=0.02)
-        assert not found.messages
 
 
 def moved(front: Front, by: float, seed: int) -> Front:

@@ -1,4 +1,4 @@
-"""Both skip entries against Newton's law in vectors and the papers' figures, their ends flown again by code of its own."""
+"""Both skip entries against Newton's law in vectors and the papers' figures, their ends flown again by code of its own, and a choice."""
 
 import math
 from collections.abc import Callable
@@ -9,10 +9,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from vectors import cross
 
-from macs import payoff
+from macs import Front, payoff, sweep
+from macs.decisions import ReferencePoint, decide, trade_offs
 from problems import load
 from problems.cases.skip_entry import front as front_of
 from transcription import stated
+from transcription.nlp.scalarized import scalarize
 
 DEGREE = math.pi / 180
 LIMITS = [200, 13406.4583, 2.5]
@@ -167,18 +169,51 @@ def test_the_thrust_of_the_skip_may_lag():
     assert lagged.states[0].lower == 55e3 and lagged.states[6].upper == 80e3
 
 
-@pytest.mark.slow
-def test_the_ends_of_the_skips_front_fly():
-    """Limits within half a per cent, the end within a metre, never below the lowest altitude by more; as good as hours of search."""
+@pytest.fixture(scope="module")
+def skips() -> Front:
+    """Its ends and two points between."""
     problem = load("skip")
-    front = payoff(problem, stated(problem.default_transcription), starts=1)
+    return sweep(problem, stated(problem.default_transcription), points=4, method="epsilon", starts=1, verify=None)
+
+
+@pytest.mark.slow
+def test_the_ends_of_the_skips_front_fly(skips):
+    """Limits within half a per cent, the end within a metre, never below the lowest altitude by more; as good as hours of search."""
+    heaviest, *_, fastest = sorted(skips, key=lambda point: point.F[0])
     known = front_of("skip")
-    assert front[0].objectives["terminal mass"] > known[:, 0].max() - 20.0
-    assert front[1].objectives["terminal speed"] > 7802.87 and front[1].objectives["terminal mass"] > known[:, 0].min() - 20.0
-    for point in front:
+    assert heaviest.objectives["terminal mass"] > known[:, 0].max() - 20.0
+    assert fastest.objectives["terminal speed"] > 7802.87 and fastest.objectives["terminal mass"] > known[:, 0].min() - 20.0
+    for point in (heaviest, fastest):
         (_, end), most, lowest = PAPERS["skip"].flown(point.trajectory)
         assert most.max() < 1.005 and lowest > 51880 - 1.0 and end[0] == pytest.approx(79248, abs=1.0)
         assert [end[6], end[3]] == pytest.approx(list(point.objectives.values()), rel=1e-5)
+
+
+@pytest.mark.slow
+def test_rates_of_the_skips_front_agree_with_differences_of_other_optima(skips):
+    """The greatest mass at speeds a little to both sides of each point's."""
+    nlp = stated(load("skip").default_transcription).nlp(load("skip"))
+    assert len(skips) == 4
+    for point in skips[1:-1]:
+        first, second = (
+            scalarize(nlp, point.decision, reference=np.array([0.0, point.F[1] + shift]), weights=np.array([1.0, 0.0]))
+            for shift in 0.002 * np.ptp(skips.F[:, 1]) * np.array([-1.0, 1.0])
+        )
+        assert first.status == second.status == "converged"
+        mass, speed = second.F - first.F
+        found = trade_offs(point)
+        assert found.rate("terminal mass", "terminal speed") == pytest.approx(mass / speed, rel=0.02)
+        assert found.matrix[1, 0] == pytest.approx(mass / speed, rel=0.02)
+        assert not found.messages
+
+
+@pytest.mark.slow
+def test_a_skip_is_chosen_at_the_kink_of_the_largest_distance(skips):
+    """There both distances are equal."""
+    choice = decide(load("skip"), ReferencePoint({"terminal mass": 60000.0}), start=skips, starts=1)
+    assert choice.message == "" and choice.point.verified and choice.point.optimality < 1e-6
+    a, b = (1 - degree for degree in choice.degrees.values())
+    assert a == pytest.approx(b, abs=1e-6) and np.isfinite(choice.value)
 
 
 def reversals(phase) -> np.ndarray:
