@@ -76,7 +76,7 @@ def test_the_constants_are_those_of_the_literature():
     assert pytest.approx(13406.46, abs=0.02) == 280 * PRESSURE
 
 
-def test_the_ends_and_the_limits_are_those_of_the_paper():
+def test_ends_limits_and_zones_are_those_of_the_paper():
     ft, deg = 0.3048, math.pi / 180
     phase = load("reentry_case1").compile().phases[0]
     initial = dict(zip(STATES, phase.initial, strict=True))
@@ -94,9 +94,6 @@ def test_the_ends_and_the_limits_are_those_of_the_paper():
     for case, limits in (("reentry_case1", (200, 280, 2.5)), ("reentry_case2", (150, 250, 1.25)), ("reentry_case3", (200, 280, 2.5))):
         paths = load(case).compile().phases[0].paths
         assert [path.upper for path in paths[:3]] == list(limits) and len(paths) == (6 if case == "reentry_case3" else 3)
-
-
-def test_zones_are_circles_on_the_map():
     phase = load("reentry_case3").compile().phases[0]
     x = np.array([50e3, math.radians(33), math.radians(11.5), 5000, 0, 1.5, 0.3, -1])
     distances = np.array(phase.path(x, [0.3, -1], 0, [0, 2000])).ravel()[3:]

@@ -91,7 +91,7 @@ def two(monkeypatch):
     monkeypatch.setitem(BENCHES, "second", a_bench(targets=asked(2.1)))
 
 
-def test_the_command_prints_judges_and_saves(two, capsys, tmp_path):
+def test_the_command_prints_judges_and_saves_with_seeds_and_quickly_too(two, capsys, tmp_path):
     path = tmp_path / "all.csv"
     assert main(["bench", "--csv", str(path)]) == 1 and main(["bench", "first"]) == 0
     said = capsys.readouterr()
@@ -101,9 +101,6 @@ def test_the_command_prints_judges_and_saves(two, capsys, tmp_path):
         table = list(csv.DictReader(file))
     assert {row["benchmark"] for row in table} == {"first", "second"} and len(table) == 24
     assert table[2] == {"benchmark": "first", "case": "1", "contender": "ours", "quantity": "value", "repetition": "2", "value": "3.0"}
-
-
-def test_seeds_and_the_quick_effort(two, capsys):
     assert main(["bench", "first", "--seeds", "5"]) == 0 and "3.00 [2.00, 4.00]" in capsys.readouterr().out
     assert main(["bench", "first", "--quick"]) == 1 and "10 " not in capsys.readouterr().out
 

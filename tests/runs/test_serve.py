@@ -128,16 +128,13 @@ def client(made):
         yield one
 
 
-def test_only_get_and_head_are_answered(client):
+def test_only_get_and_head_are_answered_and_no_file_by_its_path(client):
     for method in ("POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "MACS"):
         answer = client.ask("/", method)
         assert (answer.status, answer.headers["Allow"]) == (405, "GET, HEAD")
     for path in ("/", "/data.json"):
         got, head = client.ask(path), client.ask(path, "HEAD")
         assert head.content == b"" and head.headers["Content-Length"] == got.headers["Content-Length"] == str(len(got.content))
-
-
-def test_no_file_is_served_by_its_path(client):
     for path in (
         *("/study.json", "/../study.json", "/details/../study.json", "/details/%2e%2e%2fstudy.json", "/..%2f..%2fetc/passwd"),
         *("//etc/passwd", "/static/main.js", "/scripts.js/", "/details/9-1.json", "/details/0-99.json", "/data", "/.progress"),
