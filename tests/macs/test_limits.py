@@ -17,6 +17,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from terminals import Terminal
 
 from macs import MACS, Front, optimize, payoff, sweep
 from macs.fronts.builders import from_vectors
@@ -318,11 +319,6 @@ def test_a_part_ends_with_the_whole():
     with Interrupts(LIMIT), within(BOUND):
         front = MACS().minimize(lambda X: np.column_stack([X[:, 0], 1 - X[:, 0]]), [(0, 1)] * 2, evaluations=10**9, seed=1)
     assert front.stats["stopped"] == "time limit" and len(front) and not front.stats["reproducible"]
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
 
 
 def test_progress_shows_itself_on_a_terminal_if_it_takes_long(monkeypatch):

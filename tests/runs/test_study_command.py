@@ -1,4 +1,3 @@
-import io
 import signal
 import subprocess
 import sys
@@ -6,6 +5,7 @@ import time
 from pathlib import Path
 
 import pytest
+from terminals import Terminal
 
 from runs import Study
 from runs.batch import file as studyfile
@@ -127,11 +127,6 @@ def test_problems_transcriptions_and_budgets_may_be_given_each_by_name(here):
         ("slow", "dfet:1x4", "macs", 60),
     ]
     assert cells[0].details["problem"]["fingerprint"] != cells[2].details["problem"]["fingerprint"]
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
 
 
 def test_a_terminal_sees_the_runs_that_are_going_on(here):

@@ -2,6 +2,8 @@ import io
 import time
 from dataclasses import replace
 
+from terminals import Terminal
+
 from macs.io.console import minutes
 from macs.solvers.progress import Progress, SearchDisplay, clock, count
 
@@ -9,11 +11,6 @@ from macs.solvers.progress import Progress, SearchDisplay, clock, count
 def standing(evaluations: int = 1200, elapsed: float = 12.0, archive: int = 4, **failures: int) -> Progress:
     ideal = {"flight time": 109.1, "speed": 0.9} if archive else {}
     return Progress(evaluations, 10_000, elapsed, archive, ideal, failures, lambda: None)
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
 
 
 def test_plain_lines_come_now_and_then_and_at_the_end():
