@@ -91,7 +91,7 @@ class Problem:
         duration : float or pair, optional
             Limits of tf - t0, which is never negative.
         time_unit : str
-            A label; the dynamics are rates per this unit.
+            A label; the dynamics are rates per this unit. If it is one of lengths or angles, such as "m" or "rad", axes are called so.
 
         Returns
         -------

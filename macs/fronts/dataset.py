@@ -26,7 +26,7 @@ from transcription.trajectories.costates import Costates, PhaseCostates
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 from ..io.netcdf import COUNT, NUMBER, TEXT, FileArray, Group, Labelled, words
-from ..io.text import document
+from ..io.text import document, ran_over
 from .columns import (
     checked,
     distinct,
@@ -35,7 +35,6 @@ from .columns import (
     named_table,
     padded,
     read_attribute,
-    read_document,
     read_documents,
     read_limits,
     read_named,
@@ -186,7 +185,7 @@ def phase_table(time_unit: str) -> dict[str, FileArray]:
     """The arrays of every phase."""
     unit = time_unit or "1"
     return {
-        "time": FileArray(("point", "node"), NUMBER, "time of the node", unit),
+        "time": FileArray(("point", "node"), NUMBER, f"{ran_over(time_unit)} of the node", unit),
         **_counts_table(["node"]),
         **STATES.table(unit, "see state_unit"),
         **CONTROLS.table(unit, "see control_unit"),
@@ -432,7 +431,7 @@ def root_columns(root: Labelled) -> dict[str, Any]:
         "excursions": read_named(root, "excursions", "quantity"),
         "transcriptions": read_documents(root["transcription"], "transcription", _is_transcription),
         "problem": read_source(root.attrs),
-        "solver": read_document(root.attrs, "solver"),
+        "solver": read_documents([read_attribute(root.attrs, "solver", str)], "solver", _is_solver)[0],
         "stats": stats,
         "message": read_attribute(root.attrs, "message", str),
         "sort": False,
@@ -441,6 +440,10 @@ def root_columns(root: Labelled) -> dict[str, Any]:
 
 def _is_transcription(value: Any) -> bool:
     return value is None or (isinstance(value, dict) and isinstance(value.get("method"), str) and isinstance(value.get("settings"), dict))
+
+
+def _is_solver(value: Any) -> bool:
+    return isinstance(value, dict) and isinstance(value.get("name", ""), str) and isinstance(value.get("settings", {}), dict)
 
 
 def _check_entries(data: Labelled, name: str, known: Sequence[str]) -> None:

@@ -14,7 +14,7 @@ from transcription.trajectories.costates import Costates, has_length
 from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
 
 from ..io.atomic import write_whole
-from ..io.text import label, per
+from ..io.text import label, per, ran_over
 
 
 def save_csv(front: Any, path: str | PathLike[str]) -> None:
@@ -71,7 +71,7 @@ def save_point_csv(point: Any, path: str | PathLike[str]) -> None:
 
 def _history(trajectory: Trajectory, phase: PhaseTrajectory, costates: Costates | None) -> dict[tuple[str, str], list[Any]]:
     """The columns of a phase, by the kind of quantity and the head."""
-    every = [("", "time", phase.time_unit, phase.time)]
+    every = [("", ran_over(phase.time_unit), phase.time_unit, phase.time)]
     every += [("state", v.name, v.unit, phase[v.name]) for v in phase.state_variables]
     every += [("control", v.name, v.unit, phase[v.name]) for v in phase.control_variables]
     every += [("path", limit.name, limit.unit, phase[limit.name]) for limit in phase.path_limits]

@@ -23,7 +23,7 @@ from functools import cached_property
 from itertools import groupby
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, NotRequired, Self, TypedDict
 from zlib import crc32
 
 import msgspec
@@ -55,6 +55,24 @@ class Definition(msgspec.Struct):
     cells: list[Cell]
     decides: list[str]
     verify: Positive | None = None
+    note: str = ""
+
+
+class Method(TypedDict):
+    """A solver or a transcription by its name, with its settings."""
+
+    name: NotRequired[str]
+    method: NotRequired[str]
+    settings: dict[str, Any]
+
+
+class Details(TypedDict):
+    """What the details of a cell have, at least."""
+
+    problem: dict[str, Any]
+    transcription: Method | None
+    solver: Method
+    terms: NotRequired[dict[str, Any]]
 
 
 class RunRecord(msgspec.Struct):
@@ -172,6 +190,8 @@ class Store:
         self.path = path
         self.definition = dict(definition)
         self.cells = tuple(checked(definition, Definition).cells)
+        for cell in self.cells:
+            checked(cell.details, Details)
         self.trust = trust
 
     @classmethod

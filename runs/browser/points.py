@@ -13,7 +13,7 @@ from macs.front import Front
 from macs.fronts.pictures.flight_plot import costate_ranges
 from macs.fronts.point import Point
 from macs.fronts.tables import footer, headline
-from macs.io.text import per
+from macs.io.text import per, ran_over
 from problems.compiled import Limit, Objective, Variable
 from transcription.trajectories.costates import Costates, has_length
 from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
@@ -122,7 +122,8 @@ def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list
         lasts = has_length(trajectory, phase)
         if costates is not None and least is not None and lasts:
             _add_costates(written, phase, costates, least)
-        times = {"unit": phase.time_unit, "t0": phase.t0, "tf": phase.tf, "lasts": lasts, "elements": len(phase.state.edges) - 1}
+        times = {"t0": phase.t0, "tf": phase.tf, "lasts": lasts, "elements": len(phase.state.edges) - 1}
+        times |= {"over": ran_over(phase.time_unit), "unit": phase.time_unit}
         found.append({"name": phase.name, **times, "times": written.times, "quantities": written.quantities})
     return found
 

@@ -15,7 +15,7 @@ from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.pictures.flight_plot import along, quantities
 from macs.fronts.pictures.front_plot import draw_designs
-from macs.fronts.pictures.style import COLORS, axis_label, blank_figure
+from macs.fronts.pictures.style import COLORS, axis_label, blank_figure, time_label
 from macs.fronts.point import Point
 from macs.io.text import label
 from macs.pareto.spread import spread
@@ -181,8 +181,7 @@ def flights_figure(
         for ax in grid[-1]:
             ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         figure.align_ylabels(grid[:, 0])
-        unit = " | ".join(dict.fromkeys(phase.time_unit for phase in flights[0].phases))
-        figure.supxlabel(axis_label("time", unit), fontsize=8)
+        figure.supxlabel(time_label(flights[0].phases), fontsize=8)
         lawful = any(law is not None for law in laws)
         lines = list(flights[0]) if len(flights[0]) > 1 else [solver or "found"] if solver or lawful else []
         handles = [Line2D([], [], color=COLORS[k % len(COLORS)], lw=1.3, label=name) for k, name in enumerate(lines)]

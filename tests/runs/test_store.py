@@ -172,6 +172,16 @@ def test_what_is_no_study_of_this_version_says_so(store):
     ):
         record.write_bytes(to_record({**content, **changes}))
         assert message(lambda: Store.open(store.path)) == f"'{record}' cannot be read: {words}"
+    cell = content["study"]["cells"][0]
+    for details in (
+        {},
+        cell["details"] | {"solver": "x"},
+        cell["details"] | {"solver": {"name": 5}},
+        cell["details"] | {"transcription": 5},
+    ):
+        forged = content["study"] | {"cells": [cell | {"details": details}]}
+        record.write_bytes(to_record(content | {"study": forged}))
+        assert f"'{record}' cannot be read" in message(lambda: Store.open(store.path))
     record.unlink()
     for path, words in (
         (store.path, "contains no study: there is no study.json in it"),

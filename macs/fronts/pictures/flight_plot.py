@@ -16,7 +16,6 @@ from ...io.text import html_block, html_table, per
 from .style import (
     COLORS,
     GREY,
-    axis_label,
     beside,
     blank_figure,
     caption,
@@ -29,6 +28,7 @@ from .style import (
     plain,
     rendered,
     styled,
+    time_label,
     wrapped,
 )
 
@@ -115,7 +115,7 @@ def draw_flights(points: Sequence[Any], figure: Any = None) -> np.ndarray:
 
 def _draw_time_axis(figure: Any, axes: np.ndarray, phases: Sequence[PhaseTrajectory]) -> None:
     """The label of the time axis, and its range over some phases."""
-    figure.supxlabel(axis_label("time", " | ".join(dict.fromkeys(phase.time_unit for phase in phases))), fontsize=9)
+    figure.supxlabel(time_label(phases), fontsize=9)
     figure.align_ylabels()
     first, last = min(phase.t0 for phase in phases), max(phase.tf for phase in phases)
     margin = 0.015 * (last - first) or 1.0  # phases without duration are seen, too

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from os import PathLike
 from typing import Any
@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import Objective
+from transcription.trajectories.trajectory import PhaseTrajectory
 
 from ...evaluation.evaluator import CONVERGED
-from ...io.text import label
+from ...io.text import label, ran_over
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255")
 """Colours of Okabe and Ito, which readers with any colour vision can distinguish; wine red instead of black, which is for references."""
@@ -94,6 +95,12 @@ def check_no_path(given: Any) -> None:
 def axis_label(name: str, unit: str) -> str:
     """Label of an axis: `name [unit]`, with powers as print has them. Lines do not end within the unit."""
     return plain(label(name, raised(unit).replace(" ", "\N{NO-BREAK SPACE}")))
+
+
+def time_label(phases: Iterable[PhaseTrajectory]) -> str:
+    """Label of the axis of what phases run over, which their units say: mostly time."""
+    units = [*dict.fromkeys(phase.time_unit for phase in phases)]
+    return axis_label(" | ".join(dict.fromkeys(map(ran_over, units))), " | ".join(units))
 
 
 def raised(unit: str) -> str:

@@ -144,7 +144,7 @@ function panelFigure(flights, { name, kind, unit }) {
   const margin = 0.07 * (high - low);
   const phases = flights.flatMap(({ detail }) => detail.phases);
   const [first, last] = extent(phases.flatMap((phase) => [phase.t0, phase.tf]));
-  const units = [...new Set(limits.map((one) => one.phase.unit))].join(" | ");
+  const [over, units] = ["over", "unit"].map((key) => [...new Set(limits.map((one) => one.phase[key]))].join(" | "));
   return {
     traces,
     title: withUnit(kind === "costate" ? `costate of ${name}` : name, unit),
@@ -155,7 +155,7 @@ function panelFigure(flights, { name, kind, unit }) {
       margin: { l: 52, r: 8, t: 6, b: 34 },
       showlegend: false,
       shapes,
-      xaxis: axis(withUnit("time", plotText(units)), { title: { text: plotText(withUnit("time", units)), standoff: 4 }, nticks: 6, range: first < last ? [first, last] : undefined }),
+      xaxis: axis(withUnit(over, plotText(units)), { title: { text: plotText(withUnit(over, units)), standoff: 4 }, nticks: 6, range: first < last ? [first, last] : undefined }),
       yaxis: axis("", { range: [low - margin, high + margin], nticks: 5 }),
     }),
   };

@@ -468,6 +468,7 @@ FORGERIES = {
     "no seed": (lambda file: file.attrs.__delitem__("seed"), "missing required field `seed`"),
     "a negative count": (put("@evaluations", -1), r"Expected `int` >= 0 - at `\$.evaluations`"),
     "JSON that never ends": (put("@solver", "[" * 100_000), "'solver' is no JSON"),
+    "a solver without a name": (put("@solver", '{"name": 5}'), "'solver' is not what it should be"),
     "a transcription that is none": (edit("transcription", 0, "3"), "'transcription' is not what it should be"),
     "another type": (put("violation", np.ones(2, dtype="f4")), "of type float32"),
     "another kind": (put("violation", np.ones(2, dtype="i8")), "'violation' has whole numbers, not numbers"),

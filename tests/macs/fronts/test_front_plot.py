@@ -271,6 +271,18 @@ def test_round_off_of_a_constant_objective_is_no_picture():
 # A few trajectories of a front, and the marks of the same points among its objectives
 
 
+@pytest.mark.parametrize(
+    ("unit", "label"), [("s", "time [s]"), ("TU", "time [TU]"), ("m", "distance [m]"), ("rad", "angle [rad]"), ("", "time")]
+)
+def test_the_axis_is_called_as_its_unit_says(unit, label, tmp_path):
+    point = flights(1)[0]
+    for phase in point.trajectory.phases:
+        object.__setattr__(phase, "time_unit", unit)
+    assert point.plot()[0].figure.get_supxlabel() == label
+    point.to_csv(tmp_path / "point.csv")
+    assert f",{label}," in (tmp_path / "point.csv").read_text(encoding="utf-8")
+
+
 def test_a_color_for_each_trajectory_in_every_panel():
     front = flights(5)
     axes = front.plot_trajectories([0, 4])
