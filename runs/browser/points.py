@@ -123,8 +123,8 @@ def curves(trajectory: Trajectory, costates: Costates | None, most: int) -> list
         if costates is not None and least is not None and lasts:
             _add_costates(written, phase, costates, least)
         times = {"t0": phase.t0, "tf": phase.tf, "lasts": lasts, "elements": len(phase.state.edges) - 1}
-        times |= {"over": ran_over(phase.time_unit), "unit": phase.time_unit}
-        found.append({"name": phase.name, **times, "times": written.times, "quantities": written.quantities})
+        over = {"over": ran_over(phase.time_unit), "unit": phase.time_unit}
+        found.append({"name": phase.name, **over, **times, "times": written.times, "quantities": written.quantities})
     return found
 
 
