@@ -18,7 +18,7 @@ from .fronts.builders import merge
 from .fronts.points import Points
 from .fronts.spreadsheets import save_csv
 from .fronts.tables import front_html, front_table, headline
-from .fronts.verified import VERIFY, simulated, unmarked, verified
+from .fronts.verified import VERIFY, fixed_scales, simulated, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
 from .refinement.front_refinement import refine_mesh
@@ -101,7 +101,8 @@ class Front(Points):
 
         By default, those that a simulation did not confirm; if the front was not simulated, it is now. Each is solved where it misses: on
         finer meshes of its own; by a method that has none, inside of the limits that it exceeds. This takes at most four tenths of what the
-        front cost, in iterations times variables, or a little where that was little. The others stay as they are. Points that are verified
+        front cost, in iterations times variables, or a little where that was little. What then misses only in its objectives, such as an
+        integral over a kink, gets those of its simulation. The others stay as they are. Points that are verified
         are compared by their simulated objectives; what is still not verified stays only if no verified point is as good.
 
         With a tolerance, each point is solved on a mesh of its own, refined until an independent simulation confirms it: errors are
@@ -163,7 +164,7 @@ class Front(Points):
             refined = refine_mesh(unmarked(self), until, 12 if limit is None else limit, time_limit, progress, more)
             return Front.of(refined).verify(self.stats.get("verify"))
         found = Front.of(polished(self, until, solves, limit, verify, time_limit, progress))
-        return found.verify(self.stats.get("verify") if verify is None else verify)
+        return Front.of(verified(found, self.stats.get("verify") if verify is None else verify, fixed_scales(self)))
 
     def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 12, more: bool = True, **limits: Any) -> Front:
         """Each point on a mesh of its own: `refine` until a tolerance."""
@@ -180,11 +181,12 @@ class Front(Points):
     def verify(self, tolerance: float | None = VERIFY) -> Front:
         """The same points, simulated by an independent integrator, and marked by whether they are as they say.
 
-        Points of a vector problem are evaluated again: their objectives may differ by the tolerance in ranges of the front.
-
-        Every solver and gradient tool does so at its end. A point is `verified` if nothing differs by more than the tolerance: its states,
-        in spans of their bounds; its bounds, final values, paths and constraints, controls between nodes included, in their scales (the
-        scale of an equality or a limit on one side is at least its size); and its objectives, in ranges of the front.
+        Points of a vector problem are evaluated again. Every solver and gradient tool does so at its end. A point is `verified` if nothing
+        differs by more than the tolerance: its states, in spans of their bounds; its bounds, final values, paths and constraints, controls
+        between nodes included, in their scales (the scale of an equality or a limit on one side is at least its size); and its objectives,
+        in units that each point keeps once it was judged (`Point.tolerances`), so that a part of a front, or a union of fronts, is judged
+        like the whole. The unit is the stated `scale`; else the range between the best points of each objective, as simulated, of those
+        that are feasible so; of one objective, its size or, if larger, the sizes of its terms, added up.
 
         Parameters
         ----------
@@ -194,7 +196,8 @@ class Front(Points):
         Returns
         -------
         Front
-            With the columns `defect`, `simulated_violation`, `simulated_F` and `verified`, and a `note` where something is missed.
+            With the columns `defect`, `simulated_violation`, `simulated_F`, `tolerances` and `verified`, and a `note` where something is
+            missed.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Absolute values and norms among the terms of an integrand.
+"""Terms of an expression, and absolute values and norms among those of an integrand.
 
 An integral is linear: where an integrand is a sum of terms, each absolute value or root among them has an integral of its own, and what is
 left has another. Whether one of these is minimised, or maximised, can then be decided one by one.
@@ -25,23 +25,28 @@ def absolute_terms(expr: ca.MX) -> list[tuple[float, ca.MX]]:
     Found are `casadi.fabs(...)` and `casadi.norm_1(...)`, also of vectors that are summed up, `casadi.sqrt(...)` and `casadi.norm_2(...)`,
     in sums, differences and multiples by numbers of any depth. Without one of these, the expression itself is the only term.
     """
+    every = terms(expr)
+    alone = [any(node.is_op(op) for op in (ca.OP_FABS, *ROOTS)) for _, node in every]
+    found, rest = ([term for term, own in zip(every, alone, strict=True) if own is kind] for kind in (True, False))
+    if not found:
+        return [(1.0, expr)]
+    if rest:
+        found.append((1.0, sum((_times(*term) for term in rest[1:]), _times(*rest[0]))))
+    return found
+
+
+def terms(expr: ca.MX) -> list[tuple[float, ca.MX]]:
+    """Factors and scalar expressions, none of them a sum, the sum of whose products is `expr`."""
     found: list[tuple[float, ca.MX]] = []
-    rest: list[tuple[float, ca.MX]] = []
     # Not by recursion: sums may have thousands of terms, one inside the other.
     left = [(1.0, expr)]
     while left:
         factor, node = left.pop()
         inner = _terms(node)
-        if any(node.is_op(op) for op in (ca.OP_FABS, *ROOTS)):
+        if inner is None:
             found.append((factor, node))
-        elif inner is None:
-            rest.append((factor, node))
         else:
             left += [(factor * own, part) for own, part in reversed(inner) if own and not part.is_zero()]
-    if not found:
-        return [(1.0, expr)]
-    if rest:
-        found.append((1.0, sum((_times(*term) for term in rest[1:]), _times(*rest[0]))))
     return found
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from .absolute import terms
 from .compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered
 
 FEW, MOST = 64, 2048
@@ -48,6 +49,21 @@ def objective_spreads(problem: CompiledProblem) -> np.ndarray:
     values = np.where(np.isfinite(values), values, 0.0)
     spread = np.median(np.abs(values - np.median(values, axis=1, keepdims=True)), axis=1)
     return np.where(spread > 0.0, spread, 1.0)
+
+
+def objective_sizes(problem: CompiledProblem, quantities: Sequence[np.ndarray], parameters: Mapping[str, float]) -> np.ndarray:
+    """The sizes of the terms of each objective, added up, (m,), from a column of quantities of each phase."""
+    return np.array(_sizes(problem)(*quantities, np.array([parameters[v.name] for v in problem.parameters]))).ravel()
+
+
+@remembered
+def _sizes(problem: CompiledProblem) -> ca.Function:
+    """Function of the arguments of the objectives: the sizes of the terms of each, added up."""
+    inputs = problem.objectives.mx_in()
+    (column,) = problem.objectives.call(inputs, True, False)
+    rows = [column.dep(i) for i in range(column.n_dep())] if column.is_op(ca.OP_VERTCAT) else [column]
+    sizes = [sum((abs(factor) * ca.fabs(term) for factor, term in terms(row)), ca.MX(0)) for row in rows]
+    return ca.Function("sizes", inputs, [ca.vertcat(*sizes)])
 
 
 def _checked(problem: CompiledProblem, labels: Sequence[Labels], p: np.ndarray, draws: Sequence[_Draw], count: int) -> list[np.ndarray]:

@@ -58,6 +58,9 @@ ROOT: dict[str, FileArray] = {
     "simulated_objectives": FileArray(
         ("point", "objective"), NUMBER, "objectives as simulated, in the user's senses", "see objective_unit", optional=True
     ),
+    "tolerances": FileArray(
+        ("point", "objective"), NUMBER, "what the simulated objective may differ by, NaN if not judged", "see objective_unit", optional=True
+    ),
     "weights": FileArray(
         ("point", "objective"),
         NUMBER,
@@ -353,6 +356,7 @@ def root_dataset(front: Points) -> Labelled:
         "objective_sense": words(front.senses),
         "objective_scale": ROOT["objective_scale"].of([goal.scale for goal in front.goals]),
         "simulated_objectives": front.simulated_F * front.signs,
+        "tolerances": front.tolerances,
         "transcription": words([document(transcription) for transcription in front.transcriptions]),
         "parameters": np.array(values, dtype=float).reshape(len(front), len(names)),
         "parameter": words(names),
@@ -418,9 +422,13 @@ def root_columns(root: Labelled) -> dict[str, Any]:
     stats = read_stats(root.attrs)
     if "verify" not in stats and not np.isnan(rows.get("defect", np.nan)).all():
         raise ValueError("the attribute 'stats' does not say what its simulated points may miss")
+    for name in ("tolerances", "within"):
+        if name in root.arrays and not (np.isnan(root[name]) | (root[name] > 0.0) & np.isfinite(root[name])).all():
+            raise ValueError(f"'{name}' has numbers that are not above 0")
     return rows | {
         "F": root["objectives"] * signs,
         "simulated_F": root["simulated_objectives"] * signs if "simulated_objectives" in root.arrays else None,
+        "tolerances": root["tolerances"] if "tolerances" in root.arrays else None,
         "decision": [row[columns] for row, columns in zip(root["decision"], own, strict=True)],
         "goals": [
             Objective(name, unit, sense, None if np.isnan(scale) else scale)

@@ -40,6 +40,7 @@ from .dataset import (
 )
 from .points import Points
 from .provenance import STATS, stats_attributes
+from .verified import with_tolerances
 
 LARGEST_FRONT = 2**30
 """Bytes that a file may have."""
@@ -136,7 +137,8 @@ def _read_front(root: Group, version: int, closest: Points | None = None) -> Poi
         raise ValueError(f"the closest point is one, not {len(closest)}")
     root, phases = upgrade(root, {name: root.groups[place] for name, place in places.items()}, version)
     data = checked(ROOT, root)
-    return Points(**root_columns(data), **read_flights(data, phases), closest=None if closest is None else closest[0])
+    points = Points(**root_columns(data), **read_flights(data, phases), closest=None if closest is None else closest[0])
+    return points if "tolerances" in data.arrays else with_tolerances(points)
 
 
 def upgrade(root: Group, phases: dict[str, Group], version: int) -> tuple[Group, dict[str, Group]]:

@@ -90,8 +90,17 @@ class Point:
 
     @property
     def verified(self) -> bool | None:
-        """Whether a simulation agrees with this point within `stats["verify"]` of its front; None if it was not simulated."""
+        """Whether a simulation agrees with this point within its own tolerances; None if it was not simulated."""
         return bool(self._points.verified[self.index]) if self._points.was_simulated[self.index] else None
+
+    @property
+    def tolerances(self) -> dict[str, float] | None:
+        """By how much its simulated objectives may differ if it is verified, by name, in the user's units; None if it was not judged yet.
+
+        They are part of the point, whatever front it belongs to; see `Front.verify`.
+        """
+        values = self._points.tolerances[self.index]
+        return None if np.isnan(values).any() else dict(zip(self._points.names, values.tolist(), strict=True))
 
     @property
     def defect(self) -> float | None:

@@ -89,6 +89,12 @@ COLUMNS = {
         _array(float), np.nan, *_stored("simulated_violation", NUMBER, "largest scaled residual of any constraint as simulated", True)
     ),
     "simulated_F": PointColumn(_array(float), np.nan),
+    "tolerances": PointColumn(_array(float), np.nan),
+    "within": PointColumn(
+        _array(float),
+        np.nan,
+        *_stored("within", NUMBER, "what the point may miss in states and constraints, scaled; NaN if not judged", True),
+    ),
     "verified": PointColumn(_array(bool), False, *_stored("verified", COUNT, "1 if the simulation agrees with the point, else 0", True)),
 }
 """What points consist of besides their decision vectors: the one table behind `Points`, its selections, unions, and its file."""
@@ -170,7 +176,9 @@ class Points:
     defect: np.ndarray  # (n,): largest difference of a state from the transcription, in spans of its bounds
     simulated_violation: np.ndarray  # (n,)
     simulated_F: np.ndarray  # (n, m)  # noqa: N815
-    verified: np.ndarray  # (n,): whether all of these agree with the point within `stats["verify"]`
+    verified: np.ndarray  # (n,): whether all of these agree with the point, within these:
+    tolerances: np.ndarray  # (n, m): in the units of the objectives. Fixed when a point is first judged, and part of it from then on
+    within: np.ndarray  # (n,): of states, in spans of their bounds, and constraints, in their scales
     source: ProblemSource | None  # identity of the problem; None for a black box
     solver: dict[str, Any]  # {"name": ..., "settings": {...}}
     stats: dict[str, Any]  # costs of the points
@@ -232,7 +240,7 @@ class Points:
     def _set(self, name: str, entries: Sequence[Any]) -> None:
         """Set a column from its entries."""
         values = COLUMNS[name].keep(entries)
-        if name in ("F", "simulated_F") and values.ndim < 2:  # none, or those that are not simulated
+        if name in ("F", "simulated_F", "tolerances") and values.ndim < 2:  # no points, or the same for all objectives
             values = frozen(np.tile(values[:, None], (1, len(self.goals))))
         setattr(self, name, values)
 

@@ -15,7 +15,7 @@ from transcription.trajectories.costates import hamiltonian_variation
 
 from ..evaluation.evaluator import CONVERGED
 from ..io.text import call, counted, duration, html_block, html_table, numbers, text_table
-from .verified import AGAIN, MISSES, constant_objectives, objective_scales, untrusted
+from .verified import AGAIN, MISSES, constant_objectives, missed, untrusted
 
 if TYPE_CHECKING:
     from .point import Point
@@ -79,7 +79,7 @@ def _table(front: Points, columns: Mapping[str, Sequence[Any]]) -> _Table:
         for variable, values in zip(front.variables, front.decision.T, strict=True):
             table.append(((variable.name, f"[{variable.unit or '-'}]"), numbers(values), False))
     if was.any():
-        off, how = np.abs(front.simulated_F - front.F) / objective_scales(front), "again" if vector else "simulated"
+        off, how = missed(front) * front.within[:, None], "again" if vector else "simulated"
         table += [] if vector else [(("defect", how), _small(front.defect), False)]
         table.append((("violation", how), _small(front.simulated_violation), False))
         table.append((("objectives", "off by"), _small(off.max(axis=1)), False))

@@ -25,7 +25,7 @@ from transcription.trajectories.trajectory import PhaseTrajectory
 from ..evaluation.evaluator import CONVERGED
 from .point import Point
 from .points import Points
-from .verified import objective_scales, verified
+from .verified import missed, verified
 
 OTHER_MACHINE = 1e-9
 """Numbers that another run of the same arithmetic on another machine may give, in scales."""
@@ -66,11 +66,13 @@ def verify(front: Points, *, tolerance: float, rtol: float = 1e-10) -> list[Chec
         programs = _programs(front)
         recomputed = [_recomputed(point, nlp) for point, nlp in zip(front, programs, strict=True)]
         marked = verified(plain, tolerance, remark=False, simulations=partial(simulate_all, stated, rtol=rtol, atol=0.1 * rtol))
-    missed = _infinite(np.abs(marked.simulated_F - front.F) / objective_scales(front)).max(axis=1, initial=0.0)
+    off = tolerance * _infinite(missed(marked)).max(axis=1, initial=0.0)
     defect, simulated = _infinite(marked.defect), _infinite(marked.simulated_violation)
 
     def check(i: int, point: Point) -> Check:
         mismatch, where, F, violation, worst = recomputed[i]
+        # Where they are those of a simulation, the other one below says whether they are right.
+        F = point.F if np.array_equal(point.F, front.simulated_F[i]) else F
         objectives = float(_infinite(np.abs(F - point.F) / np.maximum(1.0, np.abs(F))).max(initial=0.0))
         failures = [
             (not mismatch <= OTHER_MACHINE, f"stored {where} differ from the decision vector by {mismatch:.1e}"),
@@ -81,7 +83,7 @@ def verify(front: Points, *, tolerance: float, rtol: float = 1e-10) -> list[Chec
             (bool(marked.notes[i]), marked.notes[i]),
         ]
         reasons = tuple(reason for wrong, reason in failures if wrong)
-        return Check(i, mismatch, violation, objectives, float(defect[i]), float(simulated[i]), float(missed[i]), reasons)
+        return Check(i, mismatch, violation, objectives, float(defect[i]), float(simulated[i]), float(off[i]), reasons)
 
     return [check(i, point) for i, point in enumerate(front)]
 

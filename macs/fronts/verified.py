@@ -9,7 +9,7 @@ import numpy as np
 
 from problems.checks import check_positive
 from problems.compiled import CompiledProblem, Limit, Variable
-from problems.sampling import objective_spreads
+from problems.sampling import objective_sizes, objective_spreads
 from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.stopping import Stopped
 from transcription.trajectories.jumps import UNTRUSTED
@@ -20,7 +20,7 @@ from transcription.trajectories.trajectory import Trajectory
 from ..evaluation.blackbox import evaluated_again
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..io.text import counted
-from ..pareto.dominance import CONSTANT, objective_units, stated_scales
+from ..pareto.dominance import extremes, objective_units, stated_scales, varies
 from .points import Points
 from .provenance import AnyCompiled
 
@@ -68,21 +68,19 @@ class Independent(NamedTuple):
     violations: Sequence[Mapping[str, float] | None]  # of all constraints
     diverged: dict[int, str]  # where the simulation of a point has no finite states any more
     jumps: dict[int, str]  # where rates jump, so that derivatives do not say what is optimal
-
-    def off(self, points: Points, scales: np.ndarray) -> np.ndarray:
-        """Differences (n, m) of objectives, in `scales` (m,)."""
-        found = np.abs(self.F - points.F) / scales
-        return np.where(np.isfinite(found), found, np.inf)
+    sizes: np.ndarray  # (n, m): of the terms of each objective, added up
 
 
 def simulated_independently(points: Points, simulate: Callable[[list[Trajectory]], Sequence[Simulation]]) -> Independent:
     """The points as `simulate` gives them."""
     problem, (n, m) = points.compiled(), points.F.shape
-    found = Independent(np.full((n, m), np.nan), np.full(n, np.nan), np.full(n, np.nan), [""] * n, points.violations, {}, {})
+    nothing = np.full(n, np.nan)
+    found = Independent(np.full((n, m), np.nan), nothing, nothing.copy(), [""] * n, points.violations, {}, {}, np.zeros((n, m)))
     flown = {i: trajectory for i, trajectory in enumerate(points.trajectories) if trajectory is not None}
     for i, simulation in zip(flown, simulate([*flown.values()]), strict=True):
         found.worst[i], found.violation[i] = worst_violation(problem, simulation)
         found.defect[i], found.F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
+        found.sizes[i] = objective_sizes(problem, simulation.quantities, simulation.trajectory.parameters)
         if not np.isfinite(simulation.max_defect):
             found.diverged[i] = _divergence(simulation)
         if simulation.jumps:
@@ -108,7 +106,14 @@ def evaluated_independently(points: Points) -> Independent:
     assert isinstance(problem, CompiledVectorProblem)
     F, violation, violations = evaluated_again(problem, points.decision)
     return Independent(
-        F, np.zeros(len(F)), violation, [max(one, key=lambda name: one[name], default="") for one in violations], violations, {}, {}
+        F,
+        np.zeros(len(F)),
+        violation,
+        [max(one, key=lambda name: one[name], default="") for one in violations],
+        violations,
+        {},
+        {},
+        np.abs(F),
     )
 
 
@@ -123,8 +128,9 @@ def verified(
 
     A point is verified if its simulated states differ from those of the transcription by at most `tolerance` at the ends of elements, in
     spans of their bounds, if the simulated trajectory and its controls violate no constraint by more, in `verified_scale`, and if no
-    simulated objective differs by more, in `objective_scales` or `scales` (m,). Points of a vector problem may violate as much as the
-    search allowed; their rows are counted in `stats["evaluated_again"]`.
+    simulated objective differs by more than its own tolerance. Where a point has none yet, it is `tolerance` times `scales` (m,), by
+    default the `objective_scales` of all points. Points of a vector problem may violate as much as the search allowed; their rows are
+    counted in `stats["evaluated_again"]`.
     """
     check_verify(tolerance)
     if tolerance is None or points.source is None:
@@ -137,20 +143,20 @@ def verified(
             found = simulated_independently(points, simulations or Simulations(points.compiled(), tolerance))
     except Stopped:
         return points
-    scales = objective_scales(points) if scales is None else scales
-    off, allowed = found.off(points, scales), _allowed(points, tolerance)
-    agrees = (points.status == CONVERGED) & (found.defect <= tolerance) & (found.violation <= allowed) & (off <= tolerance).all(axis=1)
+    points = points.replace(violations=found.violations, defect=found.defect, simulated_violation=found.violation, simulated_F=found.F)
+    own = points.tolerances * (tolerance / points.within)[:, None]
+    for known in (scales, objective_scales(points, tolerance, found.sizes)):
+        own = own if known is None else np.where(np.isnan(own), tolerance * known, own)
+    points = points.replace(tolerances=own, within=np.full(len(points), tolerance))
+    off, agrees = missed(points), feasible_as_simulated(points, tolerance)
+    agrees &= (off <= 1.0).all(axis=1)  # not of what is no number
     agrees[list(found.jumps)] = False
-    notes = [_without_misses(note) for note in points.notes]
+    allowed, notes = _allowed(points, tolerance), [_without_misses(note) for note in points.notes]
     for i in np.flatnonzero(~agrees & ~np.isnan(found.violation)):
         reasons = _misses(points, int(i), found, off[i], tolerance, allowed, remark)
         if reasons:
             notes[i] = "; ".join([*filter(None, [notes[i]]), (AGAIN if vector else MISSES) + ", ".join(reasons)])
     return points.replace(
-        violations=found.violations,
-        defect=found.defect,
-        simulated_violation=found.violation,
-        simulated_F=found.F,
         verified=agrees,
         notes=notes,
         stats={**points.stats, "verify": float(tolerance), **(_more_rows(points, len(points)) if vector else {})},
@@ -174,7 +180,7 @@ def _misses(points: Points, i: int, found: Independent, off: np.ndarray, toleran
         reasons.append(f"its states differ by {found.defect[i]:.1e} of their bounds{unstable}")
     if not found.violation[i] <= allowed:
         reasons.append(f"it violates {found.worst[i]} by {found.violation[i]:.1e}")
-    if not off.max() <= tolerance:
+    if not off.max() <= 1.0:
         k = int(np.where(np.isfinite(off), off, -1.0).argmax())
         reasons.append(f"its '{points.names[k]}' differs by {abs(found.F[i, k] - points.F[i, k]):.2g} {points.goals[k].unit}".rstrip())
     return [*reasons, *([found.jumps[i]] if i in found.jumps else [])]
@@ -218,7 +224,7 @@ def _more_rows(points: Points, count: int) -> dict[str, int]:
 
 
 def unmarked(points: Kind) -> Kind:
-    """The same points as if they had not been simulated."""
+    """The same points as if they had not been simulated, but for their tolerances."""
     nothing = np.full(len(points), np.nan)
     return points.replace(
         defect=nothing,
@@ -242,26 +248,61 @@ def accuracy(tolerance: float) -> tuple[float, float]:
     return rtol, 0.1 * rtol
 
 
-def objective_scales(points: Points) -> np.ndarray:
-    """What counts as one in each objective (m,): the scale that was stated, or the range over the feasible points; the size of one that
-    hardly varies; and at least a small part of how much it varies within the bounds of the problem, if that is known."""
-    F, least = _variation(points)
-    return objective_units(F, stated_scales(points.goals), least)
+def objective_scales(points: Points, tolerance: float | None = None, sizes: np.ndarray | None = None) -> np.ndarray:
+    """What counts as one in each objective (m,): the `fixed_scales`, else the `objective_units`.
+
+    The range between the best of each objective comes first, of points that are feasible when simulated, within a tolerance; then that of
+    all feasible points. `sizes` (n, m) are those of terms. It is at least a small part of how much an objective varies within the bounds.
+    """
+    known = fixed_scales(points)
+    if not np.isnan(known).any():
+        return known
+    terms = np.zeros(len(known)) if sizes is None else np.nan_to_num(sizes, posinf=0.0).max(axis=0, initial=0.0)
+    found = objective_units(_judging(points, tolerance), stated_scales(points.goals), _round_off(points), terms)
+    return np.where(np.isnan(known), found, known)
+
+
+def fixed_scales(points: Points) -> np.ndarray:
+    """What counts as one in each objective (m,) by the tolerances of points, the least if there are several; NaN where none has any."""
+    return np.fmin.reduce(points.tolerances / points.within[:, None], axis=0, initial=np.nan)
+
+
+def missed(points: Points) -> np.ndarray:
+    """Differences (n, m) between simulated objectives and those of the points, in their tolerances."""
+    return np.abs(points.simulated_F - points.F) / points.tolerances
+
+
+def with_tolerances(points: Kind) -> Kind:
+    """Points that were marked before points had tolerances of their own, with those of objectives for which all of them together have
+    some, so that it does not matter which of them are marked again."""
+    within = points.stats.get("verify", np.nan)
+    fits = varies(_judging(points, within)[0]) | (stated_scales(points.goals) > 0.0)
+    own = np.where(points.was_simulated[:, None] & fits, within * objective_scales(points, within), np.nan)
+    return points.replace(tolerances=own, within=np.where(points.was_simulated, within, np.nan))
 
 
 def constant_objectives(points: Points) -> np.ndarray:
     """Mask (m,) of the objectives that are the same at all feasible points, but for what no solver can tell apart."""
-    F, least = _variation(points)
-    return np.ptp(F, axis=0) <= np.maximum(CONSTANT * np.abs(F).max(axis=0), least)
+    F = _judging(points, None)[-1]
+    return ~varies(F) | (np.ptp(F, axis=0) <= _round_off(points))
 
 
-def _variation(points: Points) -> tuple[np.ndarray, np.ndarray]:
-    """The objectives (k, m) of the feasible points, and the smallest scale (m,) that each may have."""
-    good = (points.status == CONVERGED) & np.isfinite(points.F).all(axis=1)
-    F = points.F[good] if good.any() else np.zeros((1, len(points.goals)))
-    # Round-off: a millionth of how much it varies within the bounds of the problem.
-    least = 1e-6 * objective_spreads(points.problem) if isinstance(points.problem, CompiledProblem) else np.zeros(F.shape[1])
-    return F, least
+def _judging(points: Points, tolerance: float | None) -> list[np.ndarray]:
+    """Objectives (k, m) of sets of points, best first, whose ranges say what counts as one: the best of each objective, as simulated, of
+    those that are feasible so; with several objectives all of these, and all that are feasible on their meshes."""
+    m = len(points.goals)
+    good = feasible_as_simulated(points, np.inf if tolerance is None else tolerance)
+    feasible = (points.status == CONVERGED) & np.isfinite(points.F).all(axis=1)
+    several = [points.simulated_F[good], points.F[feasible]]
+    several = [several[0][extremes(several[0])], *several] if good.any() else several[1:]
+    several = [F for F in several if len(F)] or [np.zeros((1, m))]
+    return several if m > 1 else [several[0][extremes(several[0])]]
+
+
+def _round_off(points: Points) -> np.ndarray:
+    """The smallest scale (m,) that each objective may have: a millionth of how much it varies within the bounds of the problem."""
+    problem = points.problem
+    return 1e-6 * objective_spreads(problem) if isinstance(problem, CompiledProblem) else np.zeros(len(points.goals))
 
 
 def largest_miss(problem: CompiledProblem, simulation: Simulation, F: np.ndarray, scales: np.ndarray) -> float:

@@ -100,12 +100,20 @@ def stated_scales(goals: Sequence[Objective]) -> np.ndarray:
     return np.array([goal.scale or 0.0 for goal in goals])
 
 
-def objective_units(F: np.ndarray, stated: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """The unit of each objective (m,): the stated scale, 0 for none; else its range over points F (k, m), or its size if it hardly varies,
-    and at least `least` (m,); 1 where all of these are 0."""
-    span, size = np.ptp(F, axis=0), np.abs(F).max(axis=0)
-    found = np.maximum(np.where(span > CONSTANT * size, span, size), least)
+def objective_units(several: Sequence[np.ndarray], stated: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """What counts as one in each objective (m,): the stated scale, 0 for none; else its range over the first of several sets of points
+    F (k, m) over which it varies; else its size at the points of the last set or, if larger, those of its terms together, `sizes` (m,).
+    At least `least` (m,), unless stated; 1 where all of these are 0."""
+    found = np.maximum(np.abs(several[-1]).max(axis=0), sizes)
+    for F in reversed(several):
+        found = np.where(varies(F), np.ptp(F, axis=0), found)
+    found = np.maximum(found, least)
     return np.where(stated > 0.0, stated, np.where(found > 0.0, found, 1.0))
+
+
+def varies(F: np.ndarray) -> np.ndarray:
+    """Mask (m,) of the objectives that vary over points F (k, m) by more than a small part of their size."""
+    return np.ptp(F, axis=0) > CONSTANT * np.abs(F).max(axis=0)
 
 
 def nearest(point: np.ndarray, F: np.ndarray, ranges: np.ndarray) -> np.ndarray:

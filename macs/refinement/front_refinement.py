@@ -25,6 +25,7 @@ from ..fronts.builders import certified, from_vectors
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
+from ..fronts.verified import objective_scales
 from ..gradients.ends import moved_along
 from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised
 from ..io.console import working
@@ -111,7 +112,9 @@ class FrontRefinement:
             return
         first = self.chosen[0]
         nlp = self.loop.programs(self.methods[first])
-        self.units = self.loop.units(self.front.F[self.good], nlp, self.front[first].decision)
+        judged = objective_scales(self.front)
+        fixed = ~np.isnan(self.front.tolerances).all(axis=0)
+        self.units = np.where(fixed, judged, self.loop.units(self.front.F[self.good], nlp, self.front[first].decision))
         ends = self._ends()
         between = [i for i in self.chosen if i not in ends]
         for i, task in self._tasks(ends, between):
@@ -141,6 +144,8 @@ class FrontRefinement:
             rows[i] = rows[i].replace(notes=[NOT_BEGUN])
         reached = sum(not found.complaints() for found in self.found.values())
         return Points.concatenate(rows).replace(
+            tolerances=front.tolerances,
+            within=front.within,
             solver=dict(front.solver),
             stats=more_costs(front.stats, self.solves.counts, elapsed, stopped) | {"mesh_tolerance": self.wanted.tolerance},
             message=f"{reached} of {len(front)} points meet the mesh tolerance of {self.wanted.tolerance:.0e}.",

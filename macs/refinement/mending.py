@@ -20,7 +20,7 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.builders import best_rows, certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..fronts.verified import Simulations, accuracy, largest_miss, objective_scales, untrusted, verified
+from ..fronts.verified import Simulations, accuracy, feasible_as_simulated, largest_miss, missed, objective_scales, untrusted, verified
 from ..gradients.front_polish import KEPT_INSIDE, back_off
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal
 from ..io.console import working
@@ -47,6 +47,7 @@ class MendingLimits:
 
 
 MENDING = MendingLimits()
+AS_SIMULATED = "its objectives are those of its simulation, which its mesh does not give"
 
 
 def mended(
@@ -63,13 +64,12 @@ def mended(
     if not len(points):
         return verified(points, verify)
     with working(time_limit, progress) as (show, interrupts):
-        job = _Mending(points, verify, show)
+        job = _Mending(points, verify, show, ends)
         again = job.resolve_unverified(fine)
-        joined = job.strong(again if ends is None else job.with_ends(again, ends))
+        joined = job.strong(job.with_ends(again))
         if joined is job.points and joined.verified.all():
             return _separate(joined[best_rows(joined)]).sorted()
-        # The ranges of the objectives may be others now.
-        kept = job.marked(_separate(joined[best_rows(joined, verify * objective_scales(joined))]))
+        kept = _separate(joined[best_rows(joined, verify * objective_scales(joined))])
         if joined is not job.points:
             kept = job.marked(job.fill_gaps(kept, len(points), guide))
         return job.with_costs(job.with_reasons(kept.sorted()), interrupts.elapsed, interrupts.reason)
@@ -85,21 +85,25 @@ def resolve_unverified(points: Points, verify: float) -> Points:
 class _Mending:
     """The re-solves in several steps, which share programs on meshes and simulations, each made once."""
 
-    def __init__(self, points: Points, verify: float, show: Callable[[str], None]) -> None:
+    def __init__(self, points: Points, verify: float, show: Callable[[str], None], ends: Points | None = None) -> None:
         problem = points.compiled()
         self.points, self.verify, self.show = points, verify, show
         # Points are filled up from the first meshes, too, after others were refined.
         self.programs, self.simulations = Programs(problem, kept=MENDING.meshes), Simulations(problem, verify)
         self._solves = GradientSolves(float(points.stats["tolerance"]))
-        self._work = points.stats.get("work", 0)
+        self._work, self._scales = points.stats.get("work", 0), None
+        self.ends = None if ends is None else self.marked(ends)
+        # With ends that are known to simulate, tolerances are fixed by these; else by what the points are in the end.
+        self._scales = None if self.ends is None else objective_scales(self.ends)
+        self._later = ends is None and np.isnan(points.tolerances).any()
 
-    def marked(self, points: Points) -> Points:
+    def marked(self, points: Points, remark: bool = False) -> Points:
         """The points marked by their simulations, without remarks on dynamics in their notes."""
-        return verified(points, self.verify, remark=False, simulations=self.simulations)
+        return verified(points, self.verify, self._scales, remark, self.simulations)
 
     def with_reasons(self, points: Points) -> Points:
         """The same with remarks on unverified points, since no solve can cure unstable dynamics."""
-        return points if points.verified.all() else verified(points, self.verify, simulations=self.simulations)
+        return points if points.verified.all() else self.marked(points, remark=True)
 
     def with_costs(self, points: Points, elapsed: float, stopped: str) -> Points:
         """The points with all costs of the re-solves."""
@@ -119,7 +123,17 @@ class _Mending:
         moved = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
         again = self._as_before(self._inside(again, moved, MENDING.loss))
         beyond = again.was_simulated & (again.simulated_violation > self.verify) & (again.status == CONVERGED)
-        return self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
+        again = self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
+        return self._as_simulated(self.marked(again.replace(tolerances=None)) if self._later and again is not self.points else again)
+
+    def _as_simulated(self, points: Points) -> Points:
+        """The points, with simulated objectives in place of those that are wrong where nothing else is: quadrature over a kink."""
+        rows = feasible_as_simulated(points, self.verify) & ~points.verified & ~untrusted(points)
+        if not rows.any():
+            return points
+        said = zip(points.notes, np.where(rows, AS_SIMULATED, "").tolist(), strict=True)
+        notes = ["; ".join(filter(None, words)) for words in said]
+        return self.marked(points.replace(F=np.where(rows[:, None], points.simulated_F, points.F), notes=notes))
 
     def _inside(self, points: Points, rows: list[int], loss: float = np.inf) -> Points:
         """The points, with those in `rows` moved inside the limits that they exceed; see `_inside_limits`."""
@@ -128,11 +142,12 @@ class _Mending:
         self.show("points that are infeasible when simulated are solved again")
         return self.marked(_inside_limits(points, rows, self.verify, loss))
 
-    def with_ends(self, points: Points, ends: Points) -> Points:
+    def with_ends(self, points: Points) -> Points:
         """The points with those verified ends that are better in an objective than all of them, by more than the tolerance."""
-        scales, ends = objective_scales(points), self.marked(ends)
-        good = points.simulated_F[points.verified]
-        better = ends.verified & (ends.simulated_F < good.min(axis=0, initial=np.inf) - self.verify * scales).any(axis=1)
+        ends, good = self.ends, points.simulated_F[points.verified]
+        if ends is None:
+            return points
+        better = ends.verified & (ends.simulated_F < good.min(axis=0, initial=np.inf) - ends.tolerances).any(axis=1)
         if not better.any():
             return points
         return Points.concatenate([points, ends[better]]).replace(stats=points.stats, solver=points.solver)
@@ -185,7 +200,7 @@ class _Mending:
                 found = strongly_optimal(partial(self._solves, nlp), point, weights, scales)
             if found is not point:
                 certificate = certified(nlp, found.z[None], scales)
-                new = self.marked(from_vectors(nlp, found.z[None], points.solver, points.stats, **certificate))
+                new = self.marked(from_vectors(nlp, found.z[None], points.solver, points.stats, **certificate, **_judged(points[[i]])))
                 better |= {i: new} if new.verified[0] else {}
         if not better:
             return points
@@ -199,7 +214,7 @@ class _Mending:
         lost = [i for i in unsure if points.trajectories[i] is not self.points.trajectories[i]]
         if not lost:
             return points
-        old = verified(self.points[lost], self.verify, objective_scales(points), remark=False, simulations=self.simulations)
+        old = self.marked(self.points[lost])
         rows = {i: old[[k]] for k, i in enumerate(lost) if old.verified[k]}
         return Points.concatenate([rows.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats)
 
@@ -243,8 +258,7 @@ def _slightly_outside(points: Points, verify: float) -> list[int]:
     """The points whose only fault in a simulation is that they exceed limits a little, mostly between nodes. A solve on their own mesh,
     whose program exists already, costs far less than on any other."""
     beyond = (points.simulated_violation > verify) & (points.simulated_violation <= MENDING.slightly) & (points.status == CONVERGED)
-    off = np.abs(points.simulated_F - points.F) / objective_scales(points)
-    return np.flatnonzero(beyond & (points.defect <= verify) & (off <= verify).all(axis=1)).tolist()
+    return np.flatnonzero(beyond & (points.defect <= verify) & (missed(points) <= 1.0).all(axis=1)).tolist()
 
 
 def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: float = np.inf) -> Points:
@@ -262,7 +276,7 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: flo
         worse = ((nlp.evaluate(Z)[0] - points.F[own]) / scales).max(axis=1)
         points = points.replace(stats=more_costs(points.stats, evaluator.counts, 0.0, ""))
         for k in np.flatnonzero(feasible & changed & (worse <= loss)).tolist():
-            moved[own[k]] = from_vectors(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE])
+            moved[own[k]] = from_vectors(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE], **_judged(points[[own[k]]]))
     if not moved:
         return points
     return Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats, solver=points.solver)
@@ -272,6 +286,11 @@ def _separate(points: Points) -> Points:
     """The points without those in the same place as another; see `separate`."""
     seen = np.where(points.verified[:, None], points.simulated_F, points.F)
     return points[np.flatnonzero(separate(seen, objective_scales(points)))] if len(points) else points
+
+
+def _judged(points: Points) -> dict[str, np.ndarray]:
+    """The columns by which points are judged."""
+    return {"tolerances": points.tolerances, "within": points.within}
 
 
 def _within(points: Points, size: int, guide: Guide | None) -> np.ndarray:

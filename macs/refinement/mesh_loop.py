@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from problems.compiled import CompiledProblem
-from problems.sampling import refuse_peaks
+from problems.sampling import objective_sizes, refuse_peaks
 from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
 from transcription.meshed import Meshed
@@ -190,7 +190,9 @@ class MeshLoop:
     def units(F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
         """The unit of each objective (m,), see `objective_units`: at least a small part of its variation near a vector of the NLP, since
         the own size of an objective near zero is no measure."""
-        return objective_units(F, stated_scales(nlp.problem.goals), LOOP.little * objective_variations(nlp, z))
+        quantities = [np.array(q).ravel() for q in nlp.quantities.call([z])]
+        sizes = objective_sizes(nlp.problem, quantities, nlp.unpack(z).parameters)
+        return objective_units([F], stated_scales(nlp.problem.goals), LOOP.little * objective_variations(nlp, z), sizes)
 
     def on_mesh(
         self,

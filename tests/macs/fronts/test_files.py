@@ -6,13 +6,14 @@ import json
 import os
 import pickle
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 import xarray
+from carts import cart, constant, points
 from damage import damaged
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -306,6 +307,34 @@ def test_older_formats_are_read_with_a_warning(tmp_path, version):
     assert [point.verified for point in old] == [None] * len(old) and "verify" not in old.stats and "verified" not in old.table()
     old.save(path)
     assert_same(Front.load(path), old)
+
+
+def test_points_of_files_without_tolerances_stay_as_they_were_marked(tmp_path, monkeypatch):
+    """The tolerance is a thousandth of the range of both points, also where only one of them is marked again."""
+    front = points(cart(), *constant(0.5, 1.5)).verify()
+    front = front.replace(F=front.F + 5e-4, verified=[False, True])
+    monkeypatch.setattr(files, "root_dataset", partial(without_tolerances, files.root_dataset))
+    front.save(tmp_path / "front.nc")
+    monkeypatch.undo()
+    old = Front.load(tmp_path / "front.nc", problem=cart())
+    assert old.verified.tolist() == [False, True] and old[0].tolerances == pytest.approx({"distance": 2e-3, "effort": 4e-3})
+    assert old.verify().verified.all() and old[:1].verify().verified.all()
+    front[:1].save(tmp_path / "front.nc")
+    assert Front.load(tmp_path / "front.nc").tolerances == pytest.approx(front[:1].tolerances)
+
+
+def without_tolerances(of, front):
+    """What an earlier MACS would have written."""
+    root = of(front)
+    return replace(root, arrays={name: values for name, values in root.arrays.items() if name not in ("tolerances", "within")})
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, np.inf])
+def test_files_with_impossible_tolerances_are_refused(tmp_path, wrong):
+    for name, columns in (("tolerances", [[wrong, 1.0]] * 2), ("within", [wrong] * 2)):
+        marked(flights(2), [True, False]).replace(**{name: columns}).save(tmp_path / "front.nc")
+        with pytest.raises(ValueError, match=f"'{name}' has numbers that are not above 0"):
+            Front.load(tmp_path / "front.nc")
 
 
 def before_limits_had_units(saved: Front) -> Front:

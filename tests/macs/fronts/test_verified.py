@@ -1,16 +1,22 @@
 """Points marked by a simulation: scales, notes, and what is not simulated. x' = u is integrated exactly by every method that is used."""
 
+from functools import lru_cache, partial
+
 import casadi as ca
 import numpy as np
 import pytest
 from carts import MESH, cart, constant, points, slowed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from synthetic_fronts import black_box
 
-from macs import MACS, NSGA2, optimize
+from macs import MACS, NSGA2, Front, optimize, sweep
 from macs.evaluation.blackbox import plain_problem
 from macs.fronts import verified as module
+from macs.fronts.points import Points
 from macs.fronts.verified import VERIFY, Simulations, largest_miss, objective_scales, verified
-from problems import Problem
+from problems import Problem, load
 from problems.compiled import Limit, Variable, verified_scale
 from transcription import DFET, SingleShooting
 
@@ -105,6 +111,79 @@ def test_controls_may_not_leave_their_bounds_between_nodes():
     # With nodes at -s, 0 and s, where s^2 = 3 / 5, u = 2 - t / (2 s) - 5 t^2 / 6 is greatest at t = -s / 2.
     assert outside.simulated_violation == pytest.approx(0.125 / 2.0, rel=1e-2)
     assert outside.note.startswith("simulated, it violates bounds of run.u by") and ", " not in outside.note.removeprefix("simulated, ")
+
+
+@given(
+    arrays(float, (5, 2), elements=st.sampled_from([0.0, 4e-4, 2e-3, 5e-3])),
+    st.lists(st.integers(0, 4), min_size=1, max_size=7),
+    st.lists(st.integers(0, 4), max_size=3),
+)
+@settings(max_examples=40, deadline=None)
+def test_points_are_judged_alike_whatever_others_are_there(off, rows, more):
+    """Any part, order and union of a front, also of such parts that were marked again."""
+    front, judge = five_points()
+    marked = judge(front.replace(F=front.F - off), VERIFY)
+    part = marked[rows]
+    again = judge(part, VERIFY)
+    assert_same_judgement(again, part)
+    assert_same_judgement(judge(Points.concatenate([again, marked[more]]), VERIFY), marked[[*rows, *more]])
+    assert_same_judgement(judge(judge(part, 0.1), VERIFY), part, rel=1e-12)
+
+
+@lru_cache
+def five_points():
+    """A front, and what judges its points, with simulations that are made once."""
+    front = points(cart(), *constant(0.3, 0.5, 0.9, 1.0, 1.6))
+    return front, partial(verified, simulations=Simulations(front.compiled(), VERIFY))
+
+
+def assert_same_judgement(one, other, rel=0.0):
+    assert one.verified.tolist() == other.verified.tolist()
+    assert one.tolerances == pytest.approx(other.tolerances, rel=rel, abs=0.0)
+
+
+def test_fixed_by_the_ends_that_simulate():
+    """The range of what the first end claims is 50 times as wide. With two points or fewer there is another range, or none."""
+    front = points(cart(), *constant(0.5, 1.0, 1.5))
+    last = slowed(front[[2]], 0.5)
+    marked = Front.of(Points.concatenate([front[:2], last.replace(F=[[-100.0, 100.0]])])).verify()
+    assert marked.verified.tolist() == [True, True, False] and marked.tolerances == pytest.approx(np.array([[1e-3, 1.5e-3]] * 3))
+    assert marked[1].tolerances == pytest.approx({"distance": 1e-3, "effort": 1.5e-3}) and front[0].tolerances is None
+    other = points(cart(), *constant(0.1, 1.9)).verify()
+    merged = Front.merge([marked[:2], other])
+    assert merged.tolerances[:, 0].tolist() == pytest.approx([3.6e-3, 1e-3, 1e-3, 3.6e-3])
+    assert_same_judgement(merged.verify(), merged)
+
+
+@pytest.mark.parametrize("arguments", [{}, {"until": 1e-6}, {"until": MESH, "solves": 2}])
+def test_points_that_are_solved_again_keep_their_tolerances(arguments):
+    """One whose effort is not least, and that is more than it claims."""
+    rough = points(cart(), [0.2, 0.8, 0.2, 0.8]).replace(tolerances=[[1e-3, 1.5e-3]], within=[1e-3])
+    found = rough.replace(F=rough.F - 0.1).verify().refine(**arguments)
+    assert not np.array_equal(found.decision[0], rough.decision[0]) and found.verified.all()
+    assert found.tolerances == pytest.approx(np.array([[1e-3, 1.5e-3]] * len(found)))
+
+
+@pytest.mark.parametrize(("offset", "size"), [(0.0, 1.0), (-1.0, 2.0), (50.0, 51.0)])
+def test_a_single_objective_is_judged_by_its_size_or_that_of_its_terms(offset, size):
+    """The least of the square of u over a second, which moves x by 1, is 1."""
+    problem = Problem("haul")
+    phase = problem.phase("run", t0=0.0, tf=1.0)
+    phase.state("x", bounds=(-5, 5), initial=0, final=1)
+    u = phase.control("u", bounds=(-9, 9))
+    phase.dynamics(x=u)
+    problem.minimize("effort", phase.integral(u**2) + offset)
+    assert optimize(problem, MESH, starts=1).tolerances == pytest.approx({"effort": 1e-3 * size})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "method"), [("goddard", DFET(2, 4)), ("orbit_rise", DFET(3, 4)), ("skip", DFET(6, 4))])
+def test_cases_are_judged_alike(name, method):
+    front, rng = sweep(load(name), method, points=8, starts=1, seed=1), np.random.default_rng(0)
+    assert front.tolerances.shape == (len(front), 2) and (front.tolerances == front.tolerances[0]).all()
+    for _ in range(3):
+        rows = rng.permutation(len(front))[: rng.integers(1, len(front) + 1)]
+        assert_same_judgement(front[rows].verify(), front[rows])
 
 
 def test_notes_of_an_earlier_simulation_are_replaced():

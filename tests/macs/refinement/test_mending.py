@@ -1,11 +1,14 @@
 """Points that a simulation does not confirm are solved again; the ascent's least time has a closed form."""
 
+import casadi as ca
 import numpy as np
 import pytest
+from carts import points
 from smooth_problems import bryson_denham, time_against_effort
 
 from macs import MACS, NSGA2, Front, payoff, sweep
 from macs.fronts.builders import certified, from_vectors
+from macs.fronts.verification import verify
 from macs.fronts.verified import unmarked
 from macs.gradients.front_polish import KEPT_INSIDE
 from macs.refinement import mending
@@ -122,6 +125,23 @@ def test_points_of_shooting_are_moved_inside_their_limits():
 
 
 @pytest.mark.slow
+def test_an_integral_over_a_kink_is_that_of_the_simulation():
+    """Of what u has above 0 on its way from -2 to 0.3 and to -1: two triangles, which no step of this method meets; others are exact."""
+    problem = Problem("kink")
+    phase = problem.phase("run", t0=0.0, tf=2.0)
+    x, u = phase.state("x", bounds=(-5, 5), initial=0), phase.control("u", bounds=(-2, 2))
+    phase.dynamics(x=u)
+    problem.maximize("distance", phase.final(x))
+    problem.minimize("push", phase.integral(ca.fmax(u, 0.0)))
+    rough = points(problem, [-2.0, 0.3, -1.0], [-1.0, 2.0, 0.5], method=SingleShooting(3, control="linear", steps=2)).verify()
+    found = rough.refine()
+    assert rough.verified.tolist() == [False, True] and found.verified.all() and found.notes == (mending.AS_SIMULATED, "")
+    assert found.F[0, 1] == pytest.approx(0.045 * (1 / 2.3 + 1 / 1.3), rel=1e-6) and found.F[1].tolist() == rough.F[1].tolist()
+    assert found[[0]].verify().verified.all() and all(check.ok for check in verify(found, tolerance=1e-3))
+    wrong = found.replace(F=found.F - [[0.0, 0.01]])
+    assert ["stored objectives differ" in "".join(check.reasons) for check in verify(wrong, tolerance=1e-3)] == [True, True]
+
+
 def test_points_that_exceed_a_limit_by_little_keep_their_mesh():
     """The same on elements, whose states are exact: only between nodes is the height too large."""
     rough = sweep(bryson_denham(), DFET(6, 3), points=4, verify=1e-5, starts=1)
