@@ -257,7 +257,7 @@ def objective_scales(points: Points, tolerance: float | None = None, sizes: np.n
     known = fixed_scales(points)
     if not np.isnan(known).any():
         return known
-    terms = np.zeros(len(known)) if sizes is None else np.nan_to_num(sizes, posinf=0.0).max(axis=0, initial=0.0)
+    terms = np.nan_to_num(np.zeros(points.F.shape) if sizes is None else sizes, posinf=0.0).max(axis=0, initial=0.0)
     found = objective_units(_judging(points, tolerance), stated_scales(points.goals), _round_off(points), terms)
     return np.where(np.isnan(known), found, known)
 
@@ -290,13 +290,11 @@ def constant_objectives(points: Points) -> np.ndarray:
 def _judging(points: Points, tolerance: float | None) -> list[np.ndarray]:
     """Objectives (k, m) of sets of points, best first, whose ranges say what counts as one: the best of each objective, as simulated, of
     those that are feasible so; with several objectives all of these, and all that are feasible on their meshes."""
-    m = len(points.goals)
     good = feasible_as_simulated(points, np.inf if tolerance is None else tolerance)
     feasible = (points.status == CONVERGED) & np.isfinite(points.F).all(axis=1)
-    several = [points.simulated_F[good], points.F[feasible]]
-    several = [several[0][extremes(several[0])], *several] if good.any() else several[1:]
-    several = [F for F in several if len(F)] or [np.zeros((1, m))]
-    return several if m > 1 else [several[0][extremes(several[0])]]
+    several = [F for F in (points.simulated_F[good], points.F[feasible]) if len(F)] or [np.zeros((1, len(points.goals)))]
+    best = several[0][extremes(several[0])]
+    return [best, *several] if len(points.goals) > 1 else [best]
 
 
 def _round_off(points: Points) -> np.ndarray:

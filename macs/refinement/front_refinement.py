@@ -25,7 +25,7 @@ from ..fronts.builders import certified, from_vectors
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..fronts.verified import objective_scales
+from ..fronts.verified import fixed_scales
 from ..gradients.ends import moved_along
 from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised
 from ..io.console import working
@@ -112,9 +112,8 @@ class FrontRefinement:
             return
         first = self.chosen[0]
         nlp = self.loop.programs(self.methods[first])
-        judged = objective_scales(self.front)
-        fixed = ~np.isnan(self.front.tolerances).all(axis=0)
-        self.units = np.where(fixed, judged, self.loop.units(self.front.F[self.good], nlp, self.front[first].decision))
+        fixed, found = fixed_scales(self.front), self.loop.units(self.front.F[self.good], nlp, self.front[first].decision)
+        self.units = np.where(np.isnan(fixed), found, fixed)
         ends = self._ends()
         between = [i for i in self.chosen if i not in ends]
         for i, task in self._tasks(ends, between):
