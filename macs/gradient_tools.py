@@ -34,9 +34,9 @@ from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.ends import ENDS, METHODS, check_points, lexicographic_ends, solve_tasks, tasks_between
 from .gradients.multistart import MultistartSolver, MultistartStopping
-from .gradients.scalarised import MOST_ITERATIONS, WEAK, WORK, GradientSolves, Scalarised
+from .gradients.scalarised import END, MOST_ITERATIONS, WEAK, WORK, GradientSolves, Scalarised
 from .io.console import working
-from .pareto.dominance import BETTER, distinct, separate
+from .pareto.dominance import distinct, separate
 from .refinement.mending import mended, resolve_unverified
 from .refinement.mesh_loop import MeshLoop, Programs
 from .refinement.mesh_search import SEARCH, MeshSearch, coarse_meshes, search_meshes
@@ -377,7 +377,8 @@ class _Job:
         """Whether a sweep found a better value of an objective than its end, which then is only a local optimum."""
         F = np.array([solved.F for solved in found if solved.status == CONVERGED]).reshape(-1, len(ends))
         best = np.array([end.F[i] for i, end in enumerate(ends)])
-        return bool((best - F > BETTER * self._unit(self.ranges(ends))).any())
+        # What an end has lost to the others is none.
+        return bool((best - F > 2 * END.slack * self._unit(self.ranges(ends))).any())
 
     def _unit(self, ranges: np.ndarray | None) -> np.ndarray:
         scales = nlp_scales(self.nlp)

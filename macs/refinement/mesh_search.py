@@ -358,6 +358,8 @@ class MeshSearch:
             best = replace(best, rule=rule, alpha=task.loss(found[0].F))
             optima.all = [replace(one, rule=rule, alpha=best.alpha) if one.solved is known else one for one in optima.all]
         promising = different(found, best.loss if best.good else np.inf)
+        # What is known to be better is refined even if all work was done to know it.
+        loop.most_work = max(loop.most_work, loop.work + budget)
         with loop.at_most(budget):
             for solved in promising[: SEARCH.refined]:
                 if not loop.ended:
