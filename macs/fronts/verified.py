@@ -90,13 +90,18 @@ def simulated_independently(points: Points, simulate: Callable[[list[Trajectory]
 
 
 def _divergence(simulation: Simulation) -> str:
-    """Text with the element on which the states of a simulation are no longer finite."""
+    """Text with the element on which the states of a simulation are no longer finite, and the largest of them before, in its span."""
     for phase in simulation.trajectory.phases:
         finite = np.isfinite(phase.states).all(axis=1)
         if not finite.all():
-            edges, time = phase.state.edges, phase.time[int(np.argmin(finite))]
-            j = int(np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2))
-            return f"it diverges in phase '{phase.name}' between t = {edges[j]:.4g} and {edges[j + 1]:.4g} {phase.time_unit}".rstrip()
+            edges, first = phase.state.edges, int(np.argmin(finite))
+            j = int(np.clip(np.searchsorted(edges, phase.time[first], side="right") - 1, 0, len(edges) - 2))
+            where = f"it diverges in phase '{phase.name}' between t = {edges[j]:.4g} and {edges[j + 1]:.4g} {phase.time_unit}".rstrip()
+            last = phase.states[max(first - 1, 0)]
+            k = int((np.abs(last) / [v.span or 1.0 for v in phase.state_variables]).argmax())
+            v, outside = phase.state_variables[k], excess(last[None], phase.state_variables)[k] > 0.0
+            bounds = f", outside of ({v.lower:g}, {v.upper:g}), where tables may end" if outside else ""
+            return f"{where}: '{v.name}' is {f'{last[k]:.3g} {v.unit}'.rstrip()} at the node before{bounds}"
     return "its objectives are not finite"
 
 

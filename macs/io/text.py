@@ -56,7 +56,7 @@ def call(name: str, settings: Mapping[str, Any]) -> str:
 
 def duration(seconds: float) -> str:
     """A duration in words: 0.25 s, 3.6 s, 4 min 05 s, 2 h 03 min."""
-    if seconds < 60:
+    if not 60 <= seconds < np.inf:
         return f"{seconds:.2g} s" if seconds < 9.95 else f"{seconds:.0f} s"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"

@@ -56,6 +56,7 @@ class Definition(msgspec.Struct):
     decides: list[str]
     verify: Positive | None = None
     note: str = ""
+    reference: str | dict[str, str] | None = None
 
 
 class Method(TypedDict):
