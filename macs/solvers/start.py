@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from problems.checks import check_count, check_positive, unknown
-from problems.compiled import CompiledProblem, Variable
+from problems.compiled import CompiledPhase, CompiledProblem, Variable
 from transcription.base import NLP
+from transcription.phases.writer import along
 from transcription.smooth import Smooth
-from transcription.trajectories.trajectory import Trajectory
+from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 from ..fronts.point import Point
 from ..fronts.points import Points
@@ -21,6 +22,8 @@ from ..gradients.multistart import guessed_start
 from ..io.atomic import check_target
 from .progress import Progress
 
+PIECES = 200
+"""Linear pieces of a trajectory of another problem, as which it is a start."""
 STARTS = ("uniform", "smooth")
 """Words for the way first candidates are drawn."""
 
@@ -74,7 +77,8 @@ def beginning(start: Any, nlp: NLP, *, guess: bool = True) -> np.ndarray | None:
     """First full vectors (k, D) of a search: with `guess` the problem's guess, then the vectors of `start`; None if there are none.
 
     `start` is a Front, Points, or an array (k, n) of decisions, or (k, d) of their free variables. Points on other meshes are
-    interpolated; those of the problem with other data, such as other bounds, are moved into the bounds.
+    interpolated; those of the problem with other data, such as other bounds, are moved into the bounds; and of those of a variant with
+    other phases or quantities, what has the same name.
     """
     rows = []
     own = guessed_start(nlp) if guess else None
@@ -127,17 +131,58 @@ def _on_mesh(point: Point, nlp: NLP) -> np.ndarray:
     """The decision vector (n,) of a point, within the bounds, interpolated if the point is on another mesh."""
     if [v.name for v in point.variables] == [v.name for v in nlp.variables] and point.transcription == nlp.transcription.to_dict():
         return decisions([point], nlp.variables)[0]
-    if point.trajectory is None or _named(point.trajectory) != _named(nlp.problem):
+    if point.trajectory is None:
         raise ValueError(OTHER)
-    return nlp.interpolate(point.trajectory)
+    same = _named(point.trajectory) == _named(nlp.problem)
+    return nlp.interpolate(point.trajectory if same else _recast(point.trajectory, nlp.problem))
 
 
 def check_start(start: Any, problem: CompiledProblem) -> None:
-    """Raise ValueError for an unknown word, and for points of another problem (other data are allowed); no mesh is needed."""
+    """Raise ValueError for an unknown word, and for points of a problem without a state in common; no mesh is needed."""
     drawing(start)
+    states = {v.name for phase in problem.phases for v in phase.states}
     for point in _points(start):
-        if point.trajectory is not None and _named(point.trajectory) != _named(problem):
-            raise ValueError(OTHER)
+        if point.trajectory is not None and not states.intersection(
+            v.name for phase in point.trajectory.phases for v in phase.state_variables
+        ):
+            raise ValueError(f"{OTHER}, or to one that has states of the same names")
+
+
+def _recast(trajectory: Trajectory, problem: CompiledProblem) -> Trajectory:
+    """A trajectory as one of another problem: parameters, and states and controls of the same names at the same times; others as guessed,
+    or in the middle of their bounds. Phases of other names share its duration, as far as their times are free."""
+    begin, end, n = trajectory.phases[0].t0, trajectory.phases[-1].tf, len(problem.phases)
+    known, found = all(phase.name in trajectory for phase in problem.phases), list[PhaseTrajectory]()
+    for k, phase in enumerate(problem.phases):
+        old = trajectory[phase.name] if known else None
+        times = (old.t0, old.tf) if old else (begin + (end - begin) * k / n, begin + (end - begin) * (k + 1) / n)
+        t0, tf = (float(np.clip(time, v.lower, v.upper)) for time, v in zip(times, (phase.t0, phase.tf), strict=True))
+        edges = np.linspace(t0, max(tf, t0), PIECES + 1)
+        states, controls = (
+            np.column_stack([np.empty((len(edges), 0)), *(_values(v, phase, trajectory, edges) for v in group)])
+            for group in (phase.states, phase.controls)
+        )
+        state, control = (PiecewisePolynomial(edges, np.stack([one[:-1], one[1:]], axis=1), "lobatto") for one in (states, controls))
+        none = np.empty((len(edges), 0))
+        found.append(
+            PhaseTrajectory(phase.name, phase.time_unit, edges, states, controls, none, state, control, phase.states, phase.controls, ())
+        )
+    middles = {v.name: 0.5 * (v.lower + v.upper) for v in problem.parameters}
+    return Trajectory(tuple(found), {name: trajectory.parameters.get(name, value) for name, value in middles.items()})
+
+
+def _values(variable: Variable, phase: CompiledPhase, trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
+    """Values (k,) of a state or control of a phase at times (k,), from the phases of a trajectory that have one of its name."""
+    guess = phase.guesses.get(variable.name, 0.5 * (variable.lower + variable.upper))
+    values = along(guess, times[:1], times[-1:], np.linspace(0.0, 1.0, len(times)))[0]
+    first = True
+    for old in trajectory.phases:
+        names = [v.name for v in (*old.state_variables, *old.control_variables)]
+        if variable.name in names:
+            later = np.full(len(times), True) if first else times >= old.t0
+            values[later] = np.hstack([old.state(times[later]), old.control(times[later])])[:, names.index(variable.name)]
+            first = False
+    return np.clip(values, variable.lower, variable.upper)
 
 
 def _named(what: Trajectory | CompiledProblem) -> tuple[Any, ...]:

@@ -171,6 +171,34 @@ def test_a_front_of_other_data_may_begin_a_search(mesh) -> None:
         MACS().solve(lift(1.0), MESH, evaluations=60, start=before.decision)
 
 
+def test_a_front_of_a_variant_may_begin_a_search() -> None:
+    """A slew in one phase begins the same in two, with one parameter more: what has the same name, over the same time."""
+
+    def slew(phases: int) -> Problem:
+        problem = Problem("slew")
+        made = []
+        for k in range(phases):
+            last = k == phases - 1
+            phase = problem.phase(f"part {k}", t0=(0.1, 10) if k else 0.0, tf=(0.5, 10))
+            phase.state("angle", bounds=(-4, 4), initial=None if k else 0.0, final=3.0 if last else None)
+            rate = phase.state("rate", bounds=(-2, 2), initial=None if k else 0.0, final=0.0 if last else None)
+            torque = phase.control("torque", bounds=(-1, 1))
+            phase.dynamics(angle=rate, rate=torque)
+            made.append(phase)
+        if phases > 1:
+            problem.link(*made)
+            problem.constraint("spare", problem.parameter("spare", bounds=(0, 2)) + 0, upper=2.0)
+        problem.minimize("time", made[-1].tf)
+        problem.maximize("middle", made[0].final(made[0]["angle"]))
+        return problem
+
+    known = sweep(slew(1), DFET(8, 3), points=2, starts=1)[0]
+    begun = MACS(mesh="fixed").solve(slew(2), DFET(8, 3), evaluations=1, seed=1, start=known, inner="projection")
+    assert begun[0].objectives["time"] == pytest.approx(known.objectives["time"], rel=0.02)
+    assert begun[0].objectives["middle"] == pytest.approx(known.trajectory["part 0"].at(0.5 * known.objectives["time"])["angle"], abs=0.05)
+    assert begun[0].parameters["spare"] == pytest.approx(1.0)
+
+
 @pytest.mark.slow
 def test_a_start_of_another_mesh_is_interpolated() -> None:
     coarse = MACS(mesh="fixed").solve(compiled("orbit_rise"), DFET(6, 2), evaluations=300, seed=1, inner="projection")
