@@ -22,8 +22,6 @@ from ..gradients.multistart import guessed_start
 from ..io.atomic import check_target
 from .progress import Progress
 
-PIECES = 200
-"""Linear pieces of a trajectory of another problem, as which it is a start."""
 STARTS = ("uniform", "smooth")
 """Words for the way first candidates are drawn."""
 
@@ -157,7 +155,7 @@ def _recast(trajectory: Trajectory, problem: CompiledProblem) -> Trajectory:
         old = trajectory[phase.name] if known else None
         times = (old.t0, old.tf) if old else (begin + (end - begin) * k / n, begin + (end - begin) * (k + 1) / n)
         t0, tf = (float(np.clip(time, v.lower, v.upper)) for time, v in zip(times, (phase.t0, phase.tf), strict=True))
-        edges = np.linspace(t0, max(tf, t0), PIECES + 1)
+        edges = np.linspace(t0, max(tf, t0), 201)  # linear pieces, many for any mesh
         states, controls = (
             np.column_stack([np.empty((len(edges), 0)), *(_values(v, phase, trajectory, edges) for v in group)])
             for group in (phase.states, phase.controls)
