@@ -36,7 +36,8 @@ Rows = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 def real_numbers(values: Any) -> np.ndarray:
     """A copy, as floats, of what a user's function returned. Masked values are NaN: an evaluation that failed.
 
-    Raises TypeError or ValueError for anything but real numbers; a complex number is none, even if its imaginary part is 0, nor is a date.
+    Raises TypeError or ValueError for anything but real numbers. A complex number is none, even if its imaginary part is 0, nor is a date,
+    nor what a comparison gives: x <= 3 would be 1, beyond a limit of 0, where it holds.
     """
     if isinstance(values, np.ma.MaskedArray) or (
         isinstance(values, list | tuple) and any(isinstance(one, np.ma.MaskedArray) for one in values)
@@ -44,8 +45,8 @@ def real_numbers(values: Any) -> np.ndarray:
         values = np.ma.array(values)
         if not np.iscomplexobj(values):
             values = values.astype(float).filled(np.nan)
-    if (kind := np.asarray(values).dtype.kind) in "cmM":
-        raise TypeError("complex numbers" if kind == "c" else "dates or durations")
+    if np.asarray(values).dtype.kind in "bcmM":
+        raise TypeError("truth values, complex numbers, dates or durations")
     return np.array(values, dtype=float)
 
 

@@ -92,6 +92,7 @@ def test_mistakes_in_the_statement_name_the_users_own_things():
         (lambda X: dict.fromkeys(("near", "wall"), X[:, 0]) | {"nearness": X[:, :1]}, r"'nearness' has shape \(3, 1\)"),
         (lambda X: dict.fromkeys(("near", "wall"), X[:, 0]) | {"nearness": 1.0}, r"'nearness' has shape \(\)"),
         (lambda X: dict.fromkeys(("near", "wall"), X[:, 0]) | {"nearness": ["a"] * 3}, "'nearness' must be an array of real numbers"),
+        (lambda X: dict.fromkeys(("near", "nearness"), X[:, 0]) | {"wall": X[:, 0] <= 3}, "'wall' must be an array of real numbers"),
         (lambda X: dict.fromkeys(("near", "wall"), X[:, 0]) | {"nearness": 1j * X[:, 0]}, "'nearness' must be an array of real numbers"),
     ],
 )

@@ -77,6 +77,7 @@ def test_other_arguments_that_cannot_be_meant(arguments, message):
         (lambda X: two(X)[:1], r"shape \(1, 2\) for 3 points"),
         (lambda X: 7.0, r"shape \(\) for 3 points"),
         (lambda X: ["a"] * len(X), "must be an array of real numbers"),
+        (lambda X: (two(X), X[:, 0] <= 3), "function: the constraints must be an array of real numbers"),
         (lambda X: two(X) + 1j, "function: the objectives must be an array of real numbers"),
         (lambda X: two(X).astype("datetime64[s]"), "function: the objectives must be an array of real numbers"),
         (lambda X: np.ma.masked_array(two(X) + 0j, mask=False), "function: the objectives must be an array of real numbers"),
