@@ -35,6 +35,7 @@ class Display(AbstractContextManager, ABC):
 
     def __init__(self, shown: bool | None = True, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr or StringIO()
+        self._visible = getattr(self._stream, "shown", str)  # the command line shows control characters of foreign texts
         self._shown = is_live(self._stream) if shown is None else shown
         self._delay = SHOWN_AFTER if shown is None else 0.0
         self._live: Any = None
@@ -49,7 +50,7 @@ class Display(AbstractContextManager, ABC):
         """The state of the work for a terminal, as an object that rich can print."""
         from rich.text import Text
 
-        return Text(self.line())
+        return Text(self._visible(self.line()))
 
     @property
     def elapsed(self) -> float:
@@ -73,7 +74,7 @@ class Display(AbstractContextManager, ABC):
     def say(self, line: str) -> None:
         """Write a line now; on a terminal above the live display."""
         if self._live is not None:
-            self._live.console.print(line, markup=False, highlight=False)
+            self._live.console.print(self._visible(line), markup=False, highlight=False)
         elif self._shown:
             self._write(line)
 
@@ -89,7 +90,7 @@ class Display(AbstractContextManager, ABC):
         from rich.console import Console
         from rich.live import Live
 
-        console = Console(file=getattr(self._stream, "beneath", self._stream))  # the command line shows control characters of others
+        console = Console(file=getattr(self._stream, "beneath", self._stream))
         self._live = Live(console=console, refresh_per_second=8, transient=self.transient, get_renderable=self.render)
         self._live.start()
 
@@ -128,7 +129,7 @@ class StatusLine(Display):
         """The present words with a spinner."""
         from rich.spinner import Spinner
 
-        return Spinner("dots", self.line())
+        return Spinner("dots", self._visible(self.line()))
 
 
 class Steps(StatusLine):

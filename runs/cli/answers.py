@@ -39,10 +39,15 @@ class Plain:
     def __getattr__(self, name: str) -> Any:
         return getattr(self.beneath, name)
 
+    @staticmethod
+    def shown(text: str) -> str:
+        """A text with its control characters as Python writes them."""
+        return CONTROLS.sub(lambda found: ascii(found[0])[1:-1], text)
+
     def write(self, text: str) -> int:
         """As of any stream."""
         with suppress(OSError) if self._patient else nullcontext():
-            self.beneath.write(CONTROLS.sub(lambda found: ascii(found[0])[1:-1], text))
+            self.beneath.write(self.shown(text))
         return len(text)
 
     def flush(self) -> None:
