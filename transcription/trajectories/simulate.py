@@ -124,6 +124,21 @@ def simulate_elements(problem: CompiledProblem, trajectory: Trajectory, *, rtol:
     return _simulation(problem, simulated, violations, trajectory, parameters)
 
 
+def defect_of_elements(problem: CompiledProblem, trajectory: Trajectory, most: int, *, rtol: float, atol: float) -> float:
+    """The largest defect of elements that are simulated by themselves, as by `simulate_elements`: of at most so many in each phase."""
+    parameters, found = np.array([trajectory.parameters[v.name] for v in problem.parameters]), []
+    for phase in problem.phases:
+        planned, nx = trajectory[phase.name], len(phase.states)
+        known = planned.edge_states
+        rows = np.unique(np.linspace(0, len(known) - 2, min(len(known) - 1, most)).astype(int))
+        integrals, spans = np.zeros((len(rows), phase.integrands.size1_out(0))), np.array([v.span for v in phase.states])
+        arcs = Arcs.of(phase, [(planned, j, parameters) for j in rows.tolist()])
+        tolerances = atol * np.append(spans, np.ones(integrals.shape[1]))
+        ends = arcs.integrate(np.hstack([known[rows], integrals]), rtol, tolerances, "DOP853")[:, -1, :nx]
+        found.append((np.abs(ends - known[rows + 1]) / spans).max())
+    return float(np.max(found))
+
+
 def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], rtol: float, atol: float, method: str) -> list[Simulation]:
     """Simulations of trajectories of one shape."""
     parameters = [np.array([one.parameters[v.name] for v in problem.parameters]) for one in trajectories]
