@@ -93,7 +93,9 @@ def _lexicographic(solver: MultistartSolver, i: int, optima: Sequence[Solved]) -
         if not solver.is_least(best, Scalarised.single(j, m)):
             ceiling = np.where(np.isin(np.arange(m), before), best.F, np.inf)
             with solver.solves.at_most(END.ties):
-                best = without_loss(solver.from_vector, best, Scalarised.single(j, m, ceiling), END.slack * spans, [optima[j].z])
+                best = without_loss(
+                    solver.from_vector, solver.solves.tolerance, best, Scalarised.single(j, m, ceiling), END.slack * spans, [optima[j].z]
+                )
             weak |= best.message == WEAK
         before.append(j)
     # A range may be no more than rounding, where objectives are in no conflict: no solve can tell such a loss.
@@ -135,7 +137,8 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
     with solver.solves.at_most(END.ties):
         for k, solved in enumerate(found):
             if solved.status == CONVERGED and solved.multipliers is not None:
-                found[k] = strongly_optimal(solver.from_vector, solved, solved.multipliers[: len(ranges)], ranges)
+                weights, tolerance = solved.multipliers[: len(ranges)], solver.solves.tolerance
+                found[k] = strongly_optimal(solver.from_vector, tolerance, solved, weights, ranges)
     return found
 
 

@@ -103,6 +103,7 @@ WEAK = "it may be improved in other objectives without a loss in its own: no sol
 
 def without_loss(
     solve: Callable[[np.ndarray, Scalarised, bool], Solved],
+    tolerance: float,
     end: Solved,
     task: Scalarised,
     slack: np.ndarray,
@@ -111,8 +112,8 @@ def without_loss(
     """The least value of a task under a ceiling (m,) that an end attains; also from other vectors (n,), which may lie in better valleys.
 
     Often the end alone attains it: nothing is strictly inside then, and a solve takes long without improving anything. So there is `slack`
-    (m,) first. If multipliers explain the gain, the end stays. Otherwise a solve without slack follows; if it fails, what the slack loses
-    counts as nothing.
+    (m,) first. If multipliers explain the gain, the end stays. Otherwise a solve without slack follows; however that ends, it counts if it
+    is feasible and lacks little but what the slack is worth. If it does not, what the slack loses counts as nothing.
     """
     assert task.ceiling is not None
     limited, freer = task.ceiling < np.inf, replace(task, ceiling=task.ceiling + slack)
@@ -127,17 +128,23 @@ def without_loss(
         worth = best.multipliers[: len(slack)]
         rate = float(worth[limited] @ slack[limited]) / float(worth[task.moving] @ task.weights[task.moving])
         explained = max(explained, 2 * (1 + END.unsure) * rate)
-    if task.alpha(end.F) - task.alpha(best.F) <= explained:
+    gain = task.alpha(end.F) - task.alpha(best.F)
+    if gain <= explained:
         return end
     best = min([best, *(solve(other, freer, False) for other in others)], key=task.rank)
     exact = solve(best.z, task, True)
+    if exact.status != CONVERGED and task.alpha(exact.F) < task.alpha(end.F) - 0.1 * gain:
+        exact = solve(exact.z, task, True)  # much was gained before the iterations ran out
     if exact.status != CONVERGED:
-        return best
+        kept = exact.violation <= tolerance and bool((task.ceiling + 1e-3 * slack >= exact.F).all())
+        if not (kept and task.alpha(exact.F) <= task.alpha(best.F) + max(explained, 0.1 * gain)):
+            return best
+        exact = replace(exact, status=CONVERGED)
     return exact if task.alpha(exact.F) < task.alpha(end.F) else end
 
 
 def strongly_optimal(
-    solve: Callable[[np.ndarray, Scalarised, bool], Solved], point: Solved, weights: np.ndarray, ranges: np.ndarray
+    solve: Callable[[np.ndarray, Scalarised, bool], Solved], tolerance: float, point: Solved, weights: np.ndarray, ranges: np.ndarray
 ) -> Solved:
     """A point, or a better one: a point that is optimal with a positive weight (m,) on every objective is Pareto optimal; of another, the
     objectives without weight are minimised once, the others kept. ranges (m,)."""
@@ -146,7 +153,7 @@ def strongly_optimal(
     if not left.any() or left.all():
         return point
     task = Scalarised(np.where(left, point.F, np.inf), ranges, np.where(left, np.inf, point.F))
-    found = without_loss(solve, point, task, END.slack * ranges)
+    found = without_loss(solve, tolerance, point, task, END.slack * ranges)
     return found if found.message != WEAK else point
 
 
@@ -193,7 +200,7 @@ class LexicographicEnd(Scalarised):
         (F,), (violation,) = nlp.evaluate(start[None])
         closer = [start] if violation <= END.close and bool((first.F >= F).all()) else []
         with solves.at_most(END.ties):
-            second = without_loss(partial(solves, nlp), first, others, END.slack * units, closer)
+            second = without_loss(partial(solves, nlp), solves.tolerance, first, others, END.slack * units, closer)
         # What tells whether the one objective is at its least are the multipliers for that alone.
         return replace(second, multipliers=first.multipliers)
 

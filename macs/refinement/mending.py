@@ -197,7 +197,7 @@ class _Mending:
             nlp = self.programs(from_dict(points[i].transcription or {}))
             point = Solved(points[i].decision, points[i].F, points[i].violation, CONVERGED, 0)
             with self._solves.at_most(MENDING.patience):
-                found = strongly_optimal(partial(self._solves, nlp), point, weights, scales)
+                found = strongly_optimal(partial(self._solves, nlp), self._solves.tolerance, point, weights, scales)
             if found is not point:
                 certificate = certified(nlp, found.z[None], scales)
                 new = self.marked(from_vectors(nlp, found.z[None], points.solver, points.stats, **certificate, **_judged(points[[i]])))

@@ -84,7 +84,7 @@ def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(power):
     near = solver.from_vector(one.z, replace(task, ceiling=task.ceiling + slack), near=True)
     assert near.F[1] == pytest.approx(-(1e-5 ** (1 / power)), rel=0.01)
     before = solver.solves.counts.gradient_solves
-    end = without_loss(solver.from_vector, one, task, slack, [other.z])
+    end = without_loss(solver.from_vector, 1e-6, one, task, slack, [other.z])
     assert end.F[0] <= one.F[0] + 1e-8 and abs(end.z[place]) < 1e-2
     assert power == 4 or (end is one and solver.solves.counts.gradient_solves == before + 1)
 
@@ -94,12 +94,12 @@ def test_an_end_that_cannot_be_improved_with_slack_either_says_so():
     (first, _), (second, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, GOOD)
     task = Scalarised.single(1, 2, np.array([first.F[0], np.inf]))
     failing = replace(second, status="failed")
-    assert without_loss(lambda z, task, near: failing, first, task, np.full(2, 1e-5)).message == WEAK
+    assert without_loss(lambda z, task, near: failing, 1e-6, first, task, np.full(2, 1e-5)).message == WEAK
 
     def only_with_slack(z, asked, near):
         return second if asked.ceiling[0] > task.ceiling[0] else failing
 
-    assert without_loss(only_with_slack, first, task, np.full(2, 1e-5)) is second
+    assert without_loss(only_with_slack, 1e-6, first, task, np.full(2, 1e-5)) is second
 
 
 @pytest.mark.slow
@@ -153,6 +153,7 @@ class Solves:
     """Answers in their order, and what was asked: the ceiling and the start of each solve."""
 
     answers: list[Answer]
+    tolerance: float = 1e-6
     ceilings: list[np.ndarray | None] = field(default_factory=list)
     starts: list[float] = field(default_factory=list)
 
@@ -191,6 +192,7 @@ ALONE: list[Answer] = [("converged", (1.9, 5.1)), ("converged", (1.9, 5.1 - 1e-5
         pytest.param(STAYS, FAR, 2, [-1, 0, 1], [1.90001, np.inf], id="with slack, then without"),
         pytest.param(ALONE, FAR, 0, [-1, 0], [1.90001, np.inf], id="the slack alone gains"),
         pytest.param([*STAYS[:2], ("failed", (1.9, 9.9))], FAR, 1, [-1, 0, 1], [1.90001, np.inf], id="without slack it fails"),
+        pytest.param([*STAYS[:2], ("failed", (1.95, 5.04))], FAR, 1, [-1, 0, 1], [1.90001, np.inf], id="it fails with a loss"),
         pytest.param(
             [*STAYS[:2], *STAYS[1:]], Mesh((1.9, 5.0), 1e-5), 3, [-1, 0, -1, 1], [1.90001, np.inf], id="the start was nearly the end"
         ),
