@@ -192,7 +192,7 @@ ALONE: list[Answer] = [("converged", (1.9, 5.1)), ("converged", (1.9, 5.1 - 1e-5
         pytest.param(STAYS, FAR, 2, [-1, 0, 1], [1.90001, np.inf], id="with slack, then without"),
         pytest.param(ALONE, FAR, 0, [-1, 0], [1.90001, np.inf], id="the slack alone gains"),
         pytest.param([*STAYS[:2], ("failed", (1.9, 9.9))], FAR, 1, [-1, 0, 1], [1.90001, np.inf], id="without slack it fails"),
-        pytest.param([*STAYS[:2], ("failed", (1.95, 5.04))], FAR, 1, [-1, 0, 1], [1.90001, np.inf], id="it fails with a loss"),
+        pytest.param([*STAYS[:2], *2 * [("failed", (1.95, 5.04))]], FAR, 1, [-1, 0, 1, 2], [1.90001, np.inf], id="it fails with a loss"),
         pytest.param(
             [*STAYS[:2], *STAYS[1:]], Mesh((1.9, 5.0), 1e-5), 3, [-1, 0, -1, 1], [1.90001, np.inf], id="the start was nearly the end"
         ),
