@@ -158,6 +158,8 @@ def marked(front: Front, verified: list[bool], seen: list[bool] | None = None) -
         defect=np.where(saw, 1e-5, np.nan),
         simulated_violation=np.where(saw, 1e-6, np.nan),
         simulated_F=np.where(saw[:, None], 1.01 * front.F, np.nan),
+        tolerances=np.where(saw[:, None], 1e-3 + 0.02 * np.abs(front.F), np.nan),
+        within=np.where(saw, 1e-3, np.nan),
         verified=np.array(verified),
         stats={**front.stats, "verify": 1e-3},
     )

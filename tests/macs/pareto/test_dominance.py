@@ -16,6 +16,7 @@ from macs.pareto.dominance import (
     nearest,
     nondominated,
     normalised,
+    objective_units,
     ranges,
     separate,
     slack,
@@ -127,6 +128,26 @@ def test_ranges_neighbours_normalised_values_and_points_that_differ_by_rounding(
     F = np.array([[0.0, 10.0], [1e-9, 10.0 - 1e-8], [0.5, 5.0], [1.0, 0.0], [0.6, 5.5]])
     assert distinct(F, np.array([1.0, 10.0])).tolist() == [True, False, True, True, False]
     assert distinct(F, np.array([1e-3, 1e-2])).tolist() == [True, True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("several", "more", "unit"),
+    [
+        pytest.param([[[0.0], [2.0]], [[0.0], [9.0]]], {}, 2.0, id="the range over the first set"),
+        pytest.param([[[5.0], [5.0 + 4e-6]], [[0.0], [9.0]]], {}, 9.0, id="over the next, where it hardly varies"),
+        pytest.param([[[5.0], [5.0 + 6e-6]], [[0.0], [9.0]]], {}, 6e-6, id="which depends on its size"),
+        pytest.param([[[5.0]], [[-7.0]]], {}, 7.0, id="its size at the last"),
+        pytest.param([[[5.0]], [[-7.0]]], {"sizes": 8.0}, 8.0, id="its terms"),
+        pytest.param([[[0.0], [2.0]]], {"sizes": 8.0, "least": 1.0}, 2.0, id="its range, whatever its terms"),
+        pytest.param([[[0.0], [2.0]]], {"least": 3.0}, 3.0, id="at least so much"),
+        pytest.param([[[0.0], [2.0]]], {"least": 3.0, "stated": 0.1}, 0.1, id="what is stated"),
+        pytest.param([[[0.0]]], {}, 1.0, id="one, where all is nothing"),
+    ],
+)
+def test_what_counts_as_one(several, more, unit):
+    values = {"stated": 0.0, "least": 0.0, "sizes": 0.0} | more
+    arrays = {name: np.array([value]) for name, value in values.items()}
+    assert objective_units([np.array(F) for F in several], **arrays) == pytest.approx(unit, rel=1e-9)
 
 
 @given(FRONTS, st.floats(0.1, 300.0))
