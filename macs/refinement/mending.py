@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, wraps
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from transcription.inner import Propagate
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import Solved
-from transcription.stopping import stopping
+from transcription.stopping import Stopped, stopping
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED
@@ -82,6 +84,19 @@ def resolve_unverified(points: Points, verify: float) -> Points:
         return job.with_costs(job.with_reasons(job.resolve_unverified()), interrupts.elapsed, interrupts.reason)
 
 
+def _unless_stopped(step: Callable[..., Points]) -> Callable[..., Points]:
+    """A step of mending that returns its points as they are if it is to end in its middle, as while a program is built."""
+
+    @wraps(step)
+    def kept(self: _Mending, points: Points, *arguments: Any) -> Points:
+        try:
+            return step(self, points, *arguments)
+        except Stopped:
+            return points
+
+    return kept
+
+
 class _Mending:
     """The re-solves in several steps, which share programs on meshes and simulations, each made once."""
 
@@ -135,6 +150,7 @@ class _Mending:
         notes = ["; ".join(filter(None, words)) for words in said]
         return self.marked(points.replace(F=np.where(rows[:, None], points.simulated_F, points.F), notes=notes))
 
+    @_unless_stopped
     def _inside(self, points: Points, rows: list[int], loss: float = np.inf) -> Points:
         """The points, with those in `rows` moved inside the limits that they exceed; see `_inside_limits`."""
         if not rows:
@@ -167,7 +183,10 @@ class _Mending:
             rows = np.flatnonzero(points.verified)
             near = np.argsort(np.linalg.norm((points.simulated_F[rows] - target) / scales, axis=1), kind="stable")[: MENDING.starts]
             found = (self._solved(points, int(row), Scalarised(target, scales, units=scales)) for row in rows[near])
-            if (new := next((one for one in found if one is not None), None)) is not None:
+            new = None
+            with suppress(Stopped):  # which ends the loop
+                new = next((one for one in found if one is not None), None)
+            if new is not None:
                 joined = Points.concatenate([points, new]).replace(stats=points.stats, solver=points.solver)
                 points = _separate(joined[best_rows(joined)])
         return points[_within(points, size, guide)]
@@ -184,6 +203,7 @@ class _Mending:
         found = verified(found, self.verify, task.weights, remark=False, simulations=self.simulations)
         return found if found.verified[0] else None
 
+    @_unless_stopped
     def strong(self, points: Points) -> Points:
         """The points, with a better one in place of each verified one that is only weakly optimal: of each that is not optimal with a
         weight on every objective, the objectives without are minimised once. `points` itself if none is better."""
@@ -223,6 +243,7 @@ class _Mending:
         rows = rows & (points.status == CONVERGED) & ~untrusted(points)
         return [i for i in np.flatnonzero(rows).tolist() if isinstance(from_dict(points[i].transcription or {}), Meshed)]
 
+    @_unless_stopped
     def _refined(self, points: Points, rows: list[int], fine: Meshed | None) -> Points:
         """The points with some of them on a `fine` mesh, or finer ones of their own, as far as the work allows; simulated."""
         if not rows:

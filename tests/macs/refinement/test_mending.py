@@ -14,7 +14,7 @@ from macs.gradients.front_polish import KEPT_INSIDE
 from macs.refinement import mending
 from problems import Problem, load
 from transcription import DFET, SingleShooting
-from transcription.stopping import stopped_by
+from transcription.stopping import Stopped, stopped_by
 
 MESH = DFET(4, 6)
 LEAST = np.sqrt(2.0 * 10.0 * (1.0 / (4e-3 - 1.6e-3) + 1.0 / (4e-3 + 1.6e-3)))
@@ -70,6 +70,16 @@ def test_verified_points_stay_as_they_are_without_time_all_and_the_work_is_count
     found = marked.mended(time_limit=1e-9)
     assert found.verified.tolist() == [False, True, True] and found.stats["stopped"] == "time limit"
     np.testing.assert_array_equal(found.F, marked.F)
+
+
+def test_a_program_that_is_not_built_in_time_loses_nothing(marked, monkeypatch):
+    def outlasted(self, method):
+        raise Stopped("time limit")
+
+    monkeypatch.setattr(mending.Programs, "__call__", outlasted)
+    found = marked.mended()
+    np.testing.assert_array_equal(found.F, marked.F)
+    assert found.verified.tolist() == marked.verified.tolist()
 
 
 @pytest.mark.slow
