@@ -25,8 +25,7 @@ LONGEST = (
     "test_goddard_on_the_papers_mesh",
     "test_the_two_step_design_is_dominated",
     "test_with_gradients_the_front_is_as_exact_as_its_mesh",
-    "test_two_phases_of_a_skip_entry",
-    "test_rates_of_the_skip_entry_agree_with_differences_of_epsilon_constraint_optima",
+    "test_the_ends_of_the_skips_front_fly",
 )
 """Tests of minutes: they begin first, so that no worker waits in the end for another one's."""
 

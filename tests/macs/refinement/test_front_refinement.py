@@ -184,7 +184,7 @@ def test_a_search_may_refine_its_meshes_in_the_end():
 
 @pytest.mark.slow
 def test_goddard_with_defaults():
-    front = MACS(mesh="adaptive").solve(load("goddard"), DFET(4, 6), evaluations=10_000, seed=1)
+    front = MACS(mesh="adaptive").solve(load("goddard"), DFET(4, 6), evaluations=3_000, seed=1)
     good = [
         distance <= 1e-6 and point.simulate(rtol=1e-12, atol=1e-13).max_defect < 1e-7 and largest_control(point) <= np.pi / 2
         for distance, point in zip(distance_to_curve(front.objectives, reference(20001)), front, strict=True)

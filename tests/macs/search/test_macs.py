@@ -238,16 +238,16 @@ def distances(problem, seeds, evaluations):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "evaluations", "limit"),
-    [(1, 15_000, 4.0e-3), (2, 15_000, 4.0e-3), (3, 15_000, 4.6e-3), (4, 15_000, 10e-3), (4, 30_000, 5.0e-3), (6, 30_000, 3.3e-3)],
+    [(1, 15_000, 4.0e-3), (2, 15_000, 4.0e-3), (3, 15_000, 4.6e-3), (4, 15_000, 10e-3), (6, 30_000, 3.3e-3)],
 )
 def test_fronts_of_zitzler_deb_and_thiele(kind, evaluations, limit):
-    values = distances(zdt(kind), range(1, 6), evaluations)
+    values = distances(zdt(kind), range(1, 4), evaluations)
     assert np.median(values) <= limit, values
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "m", "limit"), [(3, 2, 5e-3), (4, 2, 4.3e-3), (1, 3, 0.021), (2, 3, 0.054), (4, 3, 0.056), (7, 3, 0.062)])
-def test_fronts_of_two_and_three_objectives(kind, m, limit):
+@pytest.mark.parametrize(("kind", "m", "limit"), [(1, 3, 0.021), (2, 3, 0.054), (4, 3, 0.056), (7, 3, 0.062)])
+def test_fronts_of_three_objectives(kind, m, limit):
     values = distances(dtlz(kind, m), range(1, 4), 30_000)
     assert np.median(values) <= limit, values
 
@@ -258,7 +258,7 @@ def test_with_many_objectives_it_is_nearer_to_the_front_than_nsga3_and_covers_mo
     function, bounds, _ = dtlz(2, m)
     distance, volume = {}, {}
     for solver in (MACS(archive=110), NSGA3(population=110)):
-        fronts = [solver.minimize(function, bounds, evaluations=15_000, seed=seed, progress=False).F for seed in range(1, 6)]
+        fronts = [solver.minimize(function, bounds, evaluations=15_000, seed=seed, progress=False).F for seed in range(1, 4)]
         distance[solver] = np.median([np.abs(np.linalg.norm(F, axis=1) - 1).mean() for F in fronts])
         volume[solver] = np.median([moocore.hypervolume(F[(F < 1.1).all(axis=1)], ref=np.full(m, 1.1)) for F in fronts])
     (ours, theirs), (more, less) = distance.values(), volume.values()
@@ -267,7 +267,7 @@ def test_with_many_objectives_it_is_nearer_to_the_front_than_nsga3_and_covers_mo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "limit"), [(1, 0.050), (2, 0.041), (3, 0.277)])
+@pytest.mark.parametrize(("kind", "limit"), [(1, 0.050), (3, 0.277)])
 def test_coupled_variables_of_cec_2009_are_nearer_than_the_authors(kind, limit):
     values = distances(uf(kind), range(1, 4), 30_000)
     assert np.mean(values) <= limit, values

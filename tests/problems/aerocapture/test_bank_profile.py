@@ -139,8 +139,8 @@ def test_a_shape_by_its_variables():
 @pytest.mark.slow
 def test_the_whole_trade():
     """Without a transcription: every point verified, the ends those of the single optimum and of the steepest exit."""
-    front = sweep(load("aerocapture_bank"), points=8, starts=1)
-    assert front.verified.all() and len(front) >= 7
+    front = sweep(load("aerocapture_bank"), points=5, starts=1)
+    assert front.verified.all() and len(front) >= 4
     assert front.objectives[0] == pytest.approx([36.815, assess(np.array([TABLE_2[2].design])).shield[0]], abs=0.01)
     assert front.objectives[-1, 1] < 7.2
     confirm(front[len(front) // 2], TABLE_2[2].design)

@@ -105,8 +105,8 @@ def test_the_corridor_is_a_fourth_objective():
 
 @pytest.mark.slow
 def test_every_point_of_a_front_flown_again():
-    front = MACS(archive=30).solve(load("aerocapture_codesign"), evaluations=1_000, seed=1)
-    assert front.verified.all() and len(front) > 25
+    front = MACS(archive=10).solve(load("aerocapture_codesign"), evaluations=500, seed=1)
+    assert front.verified.all() and len(front) > 8
     for point in front:
         confirm(point)
 
