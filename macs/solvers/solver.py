@@ -30,7 +30,7 @@ from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine
 from ..io.interrupts import Interrupts, work_on_trajectories
-from ..refinement.mesh_search import search_meshes
+from ..refinement.mesh_search import SearchMeshes, search_meshes
 from .method import SearchMethod
 from .progress import Progress
 from .run import ENDED, SearchRun
@@ -188,9 +188,9 @@ class Solver(SearchMethod):
             except Stopped as reason:
                 spent = {"wall_time": interrupts.elapsed, "seed": call.seed, "tolerance": call.tolerance}
                 stats = costs(earlier, **spent, stopped=str(reason), reproducible=False)
-                return Front.of(no_points(compiled.goals, compiled, about, stats | level))
+                return _or_ends(Front.of(no_points(compiled.goals, compiled, about, stats | level)), chosen).verify(verify)
             before = interrupts.elapsed
-            front = run.go()
+            front = _or_ends(run.go(), chosen)
             front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
             try:
                 return self.finish(front, verify, call.progress, chosen) if front.stats["stopped"] in ENDED else front.verify(verify)
@@ -327,6 +327,14 @@ class Solver(SearchMethod):
 
         first = None if start is None else decisions(start, problem.variables)
         return SearchRun(self, box, make_front, call, first, {"solver": about, **what}).go()
+
+
+def _or_ends(front: Front, chosen: SearchMeshes | None) -> Front:
+    """A front, or, where the search was to end before it found a point, the ends that were known by then."""
+    if len(front) or front.stats["stopped"] in ENDED or chosen is None or chosen.ends is None:
+        return front
+    message = "The search ended before it began: these are ends of the front."
+    return Front.of(chosen.ends.replace(solver=front.solver, stats=front.stats, message=message))
 
 
 def _not_simulated(front: Front, error: Exception) -> Front:

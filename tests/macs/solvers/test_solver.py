@@ -18,7 +18,7 @@ from problems import Problem, load
 from problems.compiled import CompiledProblem
 from transcription import DFET, SingleShooting
 from transcription.inner import Ipopt
-from transcription.stopping import Stopped
+from transcription.stopping import Stopped, stopped_by
 
 MESH = DFET(3, 2)
 
@@ -238,6 +238,22 @@ def test_a_search_goes_on_the_coarse_mesh_where_its_points_are_solved_on_finer_o
     monkeypatch.setattr(Solver, "_search_run", record)
     solver.solve(load("goddard"), seed=1)
     assert begun == [mesh if coarse else fine]
+
+
+def test_a_search_that_ends_before_it_begins_has_the_ends_of_the_front(monkeypatch) -> None:
+    known = sweep(load("goddard"), DFET(8, 4, basis="bernstein"), points=2, starts=1)
+    reasons = [""]
+
+    def found(*_) -> SearchMeshes:
+        reasons[0] = "time limit"
+        return SearchMeshes(DFET(8, 3), None, Counts(), known)
+
+    monkeypatch.setattr("macs.solvers.solver.search_meshes", found)
+    with stopped_by(lambda: reasons[0]):
+        front = MACS().solve(load("goddard"), seed=1)
+    np.testing.assert_array_equal(front.F, known.F)
+    assert front.verified.all() and front.stats["stopped"] and front.message.startswith("The search ended before it began")
+    assert front.solver["name"] == "MACS" and front.stats["seed"] == 1
 
 
 @pytest.mark.slow
