@@ -19,7 +19,7 @@ import numpy as np
 from problems.vector import CompiledVectorProblem
 from transcription import from_dict
 from transcription.base import NLP, Transcription
-from transcription.trajectories.simulate import simulate_all
+from transcription.trajectories.simulate import simulate
 from transcription.trajectories.trajectory import PhaseTrajectory
 
 from ..evaluation.evaluator import CONVERGED
@@ -65,7 +65,8 @@ def verify(front: Points, *, tolerance: float, rtol: float = 1e-10) -> list[Chec
         # What is wrong with the front as such is reported before any simulation.
         programs = _programs(front)
         recomputed = [_recomputed(point, nlp) for point, nlp in zip(front, programs, strict=True)]
-        marked = verified(plain, tolerance, remark=False, simulations=partial(simulate_all, stated, rtol=rtol, atol=0.1 * rtol))
+        alone = partial(simulate, stated, rtol=rtol, atol=0.1 * rtol)
+        marked = verified(plain, tolerance, remark=False, simulations=lambda several: [*map(alone, several)])
     off = tolerance * _infinite(missed(marked)).max(axis=1, initial=0.0)
     defect, simulated = _infinite(marked.defect), _infinite(marked.simulated_violation)
 

@@ -38,24 +38,21 @@ MISSES, AGAIN = "simulated, ", "evaluated again, "
 
 
 class Simulations:
-    """Simulations of trajectories of one problem, as exact as `verified` needs them, each made once."""
+    """Simulations of trajectories of one problem, as exact as `verified` needs them, each made once, and alone: side by side with others it
+    would take other steps, so that what a point misses would depend on these."""
 
     def __init__(self, problem: CompiledProblem, tolerance: float) -> None:
         self.problem, self.tolerance = problem, tolerance
         self._kept: dict[int, tuple[Trajectory, Simulation]] = {}
 
     def __call__(self, trajectories: Sequence[Trajectory]) -> list[Simulation]:
-        """The simulation of each; those that are missing are made side by side. See `simulate_all` for what it raises."""
+        """The simulation of each. See `simulate_all` for what it raises."""
         rtol, atol = accuracy(self.tolerance)
-        missing = [one for one in trajectories if id(one) not in self._kept]
-        for trajectory, simulation in zip(missing, simulate_all(self.problem, missing, rtol=rtol, atol=atol), strict=True):
-            self.keep(trajectory, simulation)
+        for one in trajectories:
+            if id(one) not in self._kept:
+                # With the trajectory: as long as it lives, no other has its identity.
+                self._kept[id(one)] = one, simulate_all(self.problem, [one], rtol=rtol, atol=atol)[0]
         return [self._kept[id(one)][1] for one in trajectories]
-
-    def keep(self, trajectory: Trajectory, simulation: Simulation) -> None:
-        """Keep one that is as exact, by whomever it was made."""
-        # With the trajectory: as long as it lives, no other has its identity.
-        self._kept[id(trajectory)] = trajectory, simulation
 
 
 class Independent(NamedTuple):

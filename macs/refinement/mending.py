@@ -22,7 +22,7 @@ from ..evaluation.evaluator import CONVERGED
 from ..fronts.builders import best_rows, certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
-from ..fronts.verified import Simulations, accuracy, feasible_as_simulated, largest_miss, missed, objective_scales, untrusted, verified
+from ..fronts.verified import Simulations, feasible_as_simulated, largest_miss, missed, objective_scales, untrusted, verified
 from ..gradients.front_polish import KEPT_INSIDE, back_off
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal
 from ..io.console import working
@@ -258,9 +258,6 @@ class _Mending:
         most = self._most_work(points, len(rows), fine)
         job = FrontRefinement(points, wanted, MENDING.meshes, rows, most, self.programs, enough, MENDING.patience, first=fine)
         job.go(self.show)
-        if wanted.accuracy <= accuracy(self.verify)[0]:
-            for found in job.found.values():
-                self.simulations.keep(found.best.trajectory, found.best.verdict.simulation)
         again = self.marked(job.points(0.0, ""))
         # What refinement would wish for besides is no complaint about a point that is verified.
         return again.replace(notes=["" if i in job.found and again.verified[i] else note for i, note in enumerate(again.notes)])
