@@ -90,7 +90,8 @@ def slack(violation: np.ndarray) -> np.ndarray:
 
 
 def ranges(F: np.ndarray) -> np.ndarray:
-    """Range (m,) of each objective over points F (k, m); if that is zero, the size of the objective, at least 1."""
+    """Range (m,) of each objective over points F (k, m), for spread and comparisons up to rounding; if that is zero, the size of the
+    objective, at least 1. What an objective may be off is judged by `objective_units`."""
     span = np.ptp(F, axis=0)
     return np.where(span > 0.0, span, np.maximum(np.abs(F).max(axis=0), 1.0))
 
