@@ -65,7 +65,7 @@ class MeshSearchLimits:
     elements: int = 40  # most of a phase on a common mesh: a search evaluates it thousands of times
     near: float = 0.25  # an edge is left out if the element is then longer than the shortest there by at most this part
     lost: float = 0.1  # part of its range by which a mesh may miss a guess: on a coarser one what it says is lost
-    angle: float = 3.0  # through which linear dynamics may swing on a cubic element, in radians
+    angle: float = 2.0  # through which linear dynamics may swing on a cubic element, in radians
     guessed: tuple[int, ...] = (8, 16, 32)  # numbers of cubic elements that are considered for that
 
 
