@@ -10,7 +10,7 @@ import casadi as ca
 from . import checks
 from .absolute import absolute_terms, radicand
 from .compiled import CompiledPhase, Limit, Variable, vector_function
-from .switching import switching
+from .switching import at_time, halves, renamed, sides, switching, value_at
 
 _KINDS = ("initial", "final", "integral", "peak")
 
@@ -48,6 +48,7 @@ class Phase:
     ) -> None:
         self.name = name
         self._problem, self._parameters = problem, parameters
+        self._owner: Any = None  # the Problem that made it
         checks.check_text(time_unit, f"phase '{name}': time_unit")
         self._time_unit = time_unit
         self._t0_range = checks.fixed_or_interval(t0, f"phase '{name}': t0")
@@ -181,6 +182,93 @@ class Phase:
         It may be minimised or bounded above; a minimum over time is `-peak(-expr)`.
         """
         return self._quantity("peak", expr)
+
+    def split(self, condition: ca.MX, *, first: bool | None = None, name: str | None = None) -> Phase:
+        """Cut the phase in two where a condition of its states switches, at a free time, so that nothing in either part jumps there.
+
+        This phase ends where the two sides of the comparison are equal; the phase that is returned goes on from there to the end. Each has
+        the value of the condition in place of it, in all rates and path constraints, and a path constraint that keeps it on its side. The
+        second phase may be split again, by another condition; one that switches back needs phases that are stated one by one.
+
+        To be called after `dynamics` and all paths, and before `tf`, `final`, `integral`, `peak` and links to later phases are used: those
+        belong to one of the two then.
+
+        Parameters
+        ----------
+        condition : MX
+            A comparison as in `casadi.if_else(x > 0, ...)`, with which the rates, or path constraints, switch.
+        first : bool, optional
+            Its value before the switch; by default what it is at the initial states, as far as these tell.
+        name : str, optional
+            Of the second phase; by default that of this one and "after".
+
+        Returns
+        -------
+        Phase
+            The second one, with states and controls of its own of the same names: `after["x"]`.
+
+        Raises
+        ------
+        ValueError
+            If there is no such condition, quantities of the phase are used already, or it is not known which side comes first.
+        """
+        place = f"phase '{self.name}'"
+        known = {name: (symbol, self._initial[name]) for name, symbol in self._symbols.items() if name in self._initial}
+        side = value_at(condition, known) if first is None and isinstance(condition, ca.MX) else first
+        expressions = self._rates | {name: expr for name, (_, expr) in self._paths.items()}
+        parts = sides(expressions, condition, bool(side), place)
+        if side is None:
+            raise ValueError(f"{place}: the initial states do not tell whether {condition} holds at first; say it: split(..., first=True)")
+        difference = condition.dep(0) - condition.dep(1)
+        after = self._cut(parts, (self._t0_range[0], self._tf_range[1]), name)
+        word = f"side of {condition}"
+        for phase, below in ((self, side), (after, not side)):
+            own = renamed({"": difference}, [*self._symbols.values()], [*phase._symbols.values()])[""]
+            phase.path(word, own, upper=0.0 if below else None, lower=None if below else 0.0)
+        self._owner.constraint(f"{place} ends at {condition}", self.final(difference), lower=0.0, upper=0.0)
+        return after
+
+    def break_at(self, time: float, *, name: str | None = None) -> Phase:
+        """Cut the phase in two at a known time, where something jumps: an element ends there. Otherwise as `split`."""
+        when = checks.number(time, f"phase '{self.name}': the time of a break")
+        if not self._t0_range[1] < when < self._tf_range[0]:
+            raise ValueError(
+                f"phase '{self.name}' need not last from before {when:g} until after it: t0 {self._t0_range}, tf {self._tf_range}"
+            )
+        expressions = self._rates | {name: expr for name, (_, expr) in self._paths.items()}
+        return self._cut(at_time(expressions, self.time, when), (when, when), name)
+
+    def _cut(self, parts: tuple[Mapping[str, ca.MX], Mapping[str, ca.MX]], when: tuple[float, float], name: str | None) -> Phase:
+        """The second of two parts of the phase, whose expressions are given; the phase itself becomes the first."""
+        place, owner = f"phase '{self.name}'", self._owner
+        times = {symbol.__hash__() for expr in parts[0].values() for symbol in ca.symvar(expr)} & self._quantity_hashes
+        ends = [kind for kind in _KINDS if kind != "initial" and self._quantities[kind]]
+        if times or ends or self.tf.__hash__() in owner._used() or owner._leads_on(self):
+            raise ValueError(f"{place}: cut it before its times, values at the end, integrals, peaks and links to later phases are used")
+        after: Phase = owner.phase(name or f"{self.name} after", t0=when, tf=self._tf_range, time_unit=self._time_unit)
+        for word, v in self._states.items():
+            after.state(word, bounds=(v.lower, v.upper), final=self._final[word], unit=v.unit, scale=v.scale)
+            self._final[word] = (v.lower, v.upper)
+        for word, v in self._controls.items():
+            after.control(word, bounds=(v.lower, v.upper), unit=v.unit, scale=v.scale, period=v.period)
+        old, new = ([*phase._symbols.values(), phase.time] for phase in (self, after))
+        ours, theirs = parts[0], renamed(parts[1], old, new)
+        after._rates = {word: theirs[word] for word in self._rates}
+        self._rates = {word: ours[word] for word in self._rates}
+        for word, (limit, _) in list(self._paths.items()):
+            self._paths[word], after._paths[word] = (limit, ours[word]), (limit, theirs[word])
+        for word, guess in list(self._guesses.items()):
+            if word not in ("t0", "tf"):
+                self._guesses[word], after._guesses[word] = halves(guess)
+        if "tf" in self._guesses:
+            after._guesses["tf"] = self._guesses.pop("tf")
+        self._tf_range = when
+        owner.link(self, after)
+        if self._duration != (0.0, float("inf")):
+            low, high = self._duration
+            owner.constraint(f"duration of {self.name}", after.tf - self.t0, lower=low, upper=None if high == float("inf") else high)
+            self._duration = (0.0, float("inf"))
+        return after
 
     def guess(self, **values: Any) -> None:
         """Say from where to start: states, controls, `t0` and `tf` by name. A number, a pair for a straight line, or (times, values)."""

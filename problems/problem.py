@@ -99,6 +99,7 @@ class Problem:
         """
         checks.new_name("phase", name, self._phases, f"problem '{self.name}'")
         self._phases[name] = Phase(name, t0, tf, duration, time_unit, problem=self.name, parameters=self.parameters)
+        self._phases[name]._owner = self
         return self._phases[name]
 
     def parameter(self, name: str, *, bounds: Any, unit: str = "", scale: float | None = None) -> ca.MX:
@@ -202,6 +203,15 @@ class Problem:
         samples(compiled, labels)
         check_links(compiled, labels)
         return with_sizes(compiled)
+
+    def _used(self) -> set[int]:
+        """Hashes of the symbols in objectives and constraints."""
+        pairs = (*self._objectives.values(), *self._constraints.values())
+        return {symbol.__hash__() for _, expr in pairs for symbol in ca.symvar(expr)}
+
+    def _leads_on(self, phase: Phase) -> bool:
+        """Whether a link leads out of a phase."""
+        return any(list(self._phases).index(phase.name) == first for first, _ in self._links)
 
     def _objective(self, name: str, expr: Any, unit: str, sense: str, scale: float | None) -> None:
         what = checks.new_name("objective", name, self._objectives, f"problem '{self.name}'")

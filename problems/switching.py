@@ -1,4 +1,4 @@
-"""Where the expressions of a phase jump: the comparisons, signs and roundings in their graphs.
+"""Where the expressions of a phase jump, by the comparisons, signs and roundings in their graphs; expressions of the two sides.
 
 `if_else(x > 0, a, b)` has the derivatives of a on one side and of b on the other; the jump between them is in no derivative.
 """
@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 COMPARISONS = (ca.OP_LT, ca.OP_LE)
 STEPPED = (*COMPARISONS, ca.OP_SIGN, ca.OP_EQ, ca.OP_NE, ca.OP_FLOOR, ca.OP_CEIL)
+Expressions = Mapping[str, ca.MX]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,3 +101,63 @@ def nodes(expression: ca.MX) -> list[ca.MX]:
             seen[node.__hash__()] = node
             left += [node.dep(i) for i in range(node.n_dep())]
     return list(seen.values())
+
+
+def sides(expressions: Expressions, condition: ca.MX, first: bool, place: str) -> tuple[Expressions, Expressions]:
+    """Expressions with the value of a condition before and after a switch in its place.
+
+    Raises
+    ------
+    ValueError
+        If it is no comparison, or none of the expressions has it.
+    """
+    if not isinstance(condition, ca.MX) or condition.op() not in COMPARISONS or condition.numel() != 1:
+        raise ValueError(f"{place}: a phase is split where one comparison switches, such as x > 0, not at {condition}")
+    flat = {name: inlined(expr) for name, expr in expressions.items()}
+    found = [node for node in nodes(ca.vertcat(*flat.values())) if same(node, condition)]
+    if not found:
+        raise ValueError(f"{place}: no rate and no path constraint has the condition {condition}; write it as it is written there")
+    return tuple(_replaced(flat, found, [ca.MX(float(side))] * len(found)) for side in (first, not first))  # type: ignore[return-value]
+
+
+def at_time(expressions: Expressions, time: ca.MX, when: float) -> tuple[Expressions, Expressions]:
+    """Expressions before and after a time, with the values in place of what switches there by the time alone."""
+    flat = {name: inlined(expr) for name, expr in expressions.items()}
+    of_time = [node for node in nodes(ca.vertcat(*flat.values())) if node.op() in COMPARISONS and _only(node, time)]
+    step = 1e-9 * max(1.0, abs(when))
+    values = [[float(ca.Function("value", [time], [node])(at)) for at in (when - step, when + step)] for node in of_time]
+    switched = [(node, pair) for node, pair in zip(of_time, values, strict=True) if pair[0] != pair[1]]
+    chosen = [node for node, _ in switched]
+    return tuple(_replaced(flat, chosen, [ca.MX(pair[k]) for _, pair in switched]) for k in (0, 1))  # type: ignore[return-value]
+
+
+def value_at(condition: ca.MX, values: Mapping[str, tuple[ca.MX, tuple[float, float]]]) -> bool | None:
+    """Whether a condition holds at symbols within ranges; None where these do not tell."""
+    symbols = [symbol for symbol, _ in values.values()]
+    function = ca.Function("value", symbols, [condition], {"allow_free": True})
+    if function.has_free():
+        return None
+    found = {float(function(*(limits[k] for _, limits in values.values()))) for k in (0, 1)}
+    return bool(found.pop()) if len(found) == 1 else None
+
+
+def renamed(expressions: Expressions, old: Sequence[ca.MX], new: Sequence[ca.MX]) -> dict[str, ca.MX]:
+    """Expressions with new symbols in place of old ones."""
+    return {name: ca.substitute([expr], list(old), list(new))[0] for name, expr in expressions.items()}
+
+
+def halves(guess: Any) -> tuple[Any, Any]:
+    """A guess for a phase as guesses for its two parts: a straight line is cut in the middle."""
+    if isinstance(guess, tuple) and len(guess) == 2 and all(isinstance(value, float | int) for value in guess):
+        middle = 0.5 * (guess[0] + guess[1])
+        return (guess[0], middle), (middle, guess[1])
+    return guess, guess
+
+
+def _replaced(expressions: Expressions, old: list[ca.MX], new: list[ca.MX]) -> dict[str, ca.MX]:
+    return {name: ca.graph_substitute([expr], old, new)[0] if old else expr for name, expr in expressions.items()}
+
+
+def _only(node: ca.MX, symbol: ca.MX) -> bool:
+    """Whether a node depends on one symbol, and on no other."""
+    return bool([one.__hash__() for one in ca.symvar(node)] == [symbol.__hash__()])

@@ -35,10 +35,8 @@ class Jump:
         where = f"phase '{self.phase}' has a jump at t = {self.time:.5g} {self.time_unit}".rstrip()
         place, end = f"it {self.how} the switch of {self.expression}", ""
         if self.difference:
-            place, end = (
-                f"it {self.how} {self.difference} = 0, where {self.expression} switches",
-                f", and {self.difference} = 0 where they meet",
-            )
+            place = f"it {self.how} {self.difference} = 0, where {self.expression} switches"
+            end = f", and {self.difference} = 0 where they meet: phase.split does that for a comparison"
         return (
             f"{where}: {place}, no derivative shows that, and {UNTRUSTED}. State two linked phases, with the values of both sides "
             f"in place of {self.expression}, a path constraint that keeps each on its side{end}"
