@@ -10,7 +10,7 @@ import casadi as ca
 from . import checks
 from .absolute import absolute_terms, radicand
 from .compiled import CompiledPhase, Limit, Variable, vector_function
-from .switching import at_time, halves, renamed, sides, switching, value_at
+from .switching import COMPARISONS, at_time, same, sides, switching, value_at
 
 _KINDS = ("initial", "final", "integral", "peak")
 
@@ -213,17 +213,20 @@ class Phase:
             If there is no such condition, quantities of the phase are used already, or it is not known which side comes first.
         """
         place = f"phase '{self.name}'"
-        known = {name: (symbol, self._initial[name]) for name, symbol in self._symbols.items() if name in self._initial}
-        side = value_at(condition, known) if first is None and isinstance(condition, ca.MX) else first
-        expressions = self._rates | {name: expr for name, (_, expr) in self._paths.items()}
-        parts = sides(expressions, condition, bool(side), place)
+        if not isinstance(condition, ca.MX) or condition.op() not in COMPARISONS or condition.numel() != 1:
+            raise ValueError(f"{place}: a phase is split where one comparison switches, such as x > 0, not at {condition}")
+        starts = {self._symbols[name].__hash__(): limits for name, limits in self._initial.items()}
+        side = value_at(condition, starts) if first is None else first
+        parts = sides(self._varying(), lambda node: (float(bool(side)), float(not side)) if same(node, condition) else None)
+        if not parts[2]:
+            raise ValueError(f"{place}: no rate and no path constraint has the condition {condition}; write it as it is written there")
         if side is None:
             raise ValueError(f"{place}: the initial states do not tell whether {condition} holds at first; say it: split(..., first=True)")
         difference = condition.dep(0) - condition.dep(1)
         after = self._cut(parts, (self._t0_range[0], self._tf_range[1]), name)
         word = f"side of {condition}"
         for phase, below in ((self, side), (after, not side)):
-            own = renamed({"": difference}, [*self._symbols.values()], [*phase._symbols.values()])[""]
+            (own,) = ca.substitute([difference], [*self._symbols.values()], [*phase._symbols.values()])
             phase.path(word, own, upper=0.0 if below else None, lower=None if below else 0.0)
         self._owner.constraint(f"{place} ends at {condition}", self.final(difference), lower=0.0, upper=0.0)
         return after
@@ -235,15 +238,17 @@ class Phase:
             raise ValueError(
                 f"phase '{self.name}' need not last from before {when:g} until after it: t0 {self._t0_range}, tf {self._tf_range}"
             )
-        expressions = self._rates | {name: expr for name, (_, expr) in self._paths.items()}
-        return self._cut(at_time(expressions, self.time, when), (when, when), name)
+        return self._cut(sides(self._varying(), lambda node: at_time(node, self.time, when)), (when, when), name)
 
-    def _cut(self, parts: tuple[Mapping[str, ca.MX], Mapping[str, ca.MX]], when: tuple[float, float], name: str | None) -> Phase:
+    def _varying(self) -> dict[str, ca.MX]:
+        """Rates and path constraints by name."""
+        return self._rates | {name: expr for name, (_, expr) in self._paths.items()}
+
+    def _cut(self, parts: tuple[dict[str, ca.MX], dict[str, ca.MX], int], when: tuple[float, float], name: str | None) -> Phase:
         """The second of two parts of the phase, whose expressions are given; the phase itself becomes the first."""
         place, owner = f"phase '{self.name}'", self._owner
         times = {symbol.__hash__() for expr in parts[0].values() for symbol in ca.symvar(expr)} & self._quantity_hashes
-        ends = [kind for kind in _KINDS if kind != "initial" and self._quantities[kind]]
-        if times or ends or self.tf.__hash__() in owner._used() or owner._leads_on(self):
+        if times or any(self._quantities[kind] for kind in _KINDS if kind != "initial") or owner._uses_end(self):
             raise ValueError(f"{place}: cut it before its times, values at the end, integrals, peaks and links to later phases are used")
         after: Phase = owner.phase(name or f"{self.name} after", t0=when, tf=self._tf_range, time_unit=self._time_unit)
         for word, v in self._states.items():
@@ -252,16 +257,18 @@ class Phase:
         for word, v in self._controls.items():
             after.control(word, bounds=(v.lower, v.upper), unit=v.unit, scale=v.scale, period=v.period)
         old, new = ([*phase._symbols.values(), phase.time] for phase in (self, after))
-        ours, theirs = parts[0], renamed(parts[1], old, new)
+        ours, theirs = parts[0], dict(zip(parts[1], ca.substitute(list(parts[1].values()), old, new), strict=True))
         after._rates = {word: theirs[word] for word in self._rates}
         self._rates = {word: ours[word] for word in self._rates}
         for word, (limit, _) in list(self._paths.items()):
             self._paths[word], after._paths[word] = (limit, ours[word]), (limit, theirs[word])
         for word, guess in list(self._guesses.items()):
-            if word not in ("t0", "tf"):
-                self._guesses[word], after._guesses[word] = halves(guess)
-        if "tf" in self._guesses:
-            after._guesses["tf"] = self._guesses.pop("tf")
+            if isinstance(guess, tuple) and isinstance(guess[0], float):  # a straight line of the whole phase
+                middle = 0.5 * (guess[0] + guess[1])
+                self._guesses[word], after._guesses[word] = (guess[0], middle), (middle, guess[1])
+            elif word != "t0":
+                after._guesses[word] = guess
+        self._guesses.pop("tf", None)
         self._tf_range = when
         owner.link(self, after)
         if self._duration != (0.0, float("inf")):
@@ -344,8 +351,7 @@ class Phase:
         roots = {row: inner for row, inner in enumerate(map(radicand, integrands)) if inner is not None}
         sizes = roots | {row: expr.dep(0) for row, expr in enumerate(integrands) if expr.is_op(ca.OP_FABS)}
 
-        varying = [*self._rates.values(), *(expr for _, expr in self._paths.values()), *integrands]
-        varying += [expr for _, expr in self._quantities["peak"]]
+        varying = [*self._varying().values(), *integrands, *(expr for _, expr in self._quantities["peak"])]
 
         return CompiledPhase(
             name=self.name,

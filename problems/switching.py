@@ -5,16 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import product
 
 import casadi as ca
 import numpy as np
 
 COMPARISONS = (ca.OP_LT, ca.OP_LE)
 STEPPED = (*COMPARISONS, ca.OP_SIGN, ca.OP_EQ, ca.OP_NE, ca.OP_FLOOR, ca.OP_CEIL)
-Expressions = Mapping[str, ca.MX]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +58,15 @@ def switching(groups: Mapping[str, Sequence[ca.MX]], expressions: Sequence[ca.MX
 
 def inlined(expression: ca.MX) -> ca.MX:
     """The expression with the operations of Functions that it calls in their place, as far as they have any to show."""
+    flat = ("MXFunction", "SXFunction")
     while True:
-        outputs = [node for node in nodes(expression) if node.is_output() and _open(node.dep(0).which_function())]
+        outputs = [node for node in nodes(expression) if node.is_output() and node.dep(0).which_function().class_name() in flat]
         if not outputs:
             return expression
         calls = [node.dep(0) for node in outputs]
         values = [call.which_function().call([call.dep(i) for i in range(call.n_dep())], True, False) for call in calls]
         chosen = [value[node.which_output()] for value, node in zip(values, outputs, strict=True)]
         (expression,) = ca.graph_substitute([expression], outputs, chosen)
-
-
-def _open(function: ca.Function) -> bool:
-    return bool(function.is_a("MXFunction") or function.is_a("SXFunction"))
 
 
 def same(one: ca.MX, other: ca.MX) -> bool:
@@ -103,61 +99,37 @@ def nodes(expression: ca.MX) -> list[ca.MX]:
     return list(seen.values())
 
 
-def sides(expressions: Expressions, condition: ca.MX, first: bool, place: str) -> tuple[Expressions, Expressions]:
-    """Expressions with the value of a condition before and after a switch in its place.
-
-    Raises
-    ------
-    ValueError
-        If it is no comparison, or none of the expressions has it.
-    """
-    if not isinstance(condition, ca.MX) or condition.op() not in COMPARISONS or condition.numel() != 1:
-        raise ValueError(f"{place}: a phase is split where one comparison switches, such as x > 0, not at {condition}")
+def sides(
+    expressions: Mapping[str, ca.MX], values: Callable[[ca.MX], tuple[float, float] | None]
+) -> tuple[dict[str, ca.MX], dict[str, ca.MX], int]:
+    """Expressions before and after a switch, with `values` of the comparisons that switch in their place; and how many these are."""
     flat = {name: inlined(expr) for name, expr in expressions.items()}
-    found = [node for node in nodes(ca.vertcat(*flat.values())) if same(node, condition)]
-    if not found:
-        raise ValueError(f"{place}: no rate and no path constraint has the condition {condition}; write it as it is written there")
-    return tuple(_replaced(flat, found, [ca.MX(float(side))] * len(found)) for side in (first, not first))  # type: ignore[return-value]
+    comparisons = [node for node in nodes(ca.vertcat(*flat.values())) if node.op() in COMPARISONS]
+    found = [(node, pair) for node in comparisons if (pair := values(node))]
+    before, after = (
+        {
+            name: ca.graph_substitute([expr], [node for node, _ in found], [ca.MX(pair[k]) for _, pair in found])[0]
+            for name, expr in flat.items()
+        }
+        for k in (0, 1)
+    )
+    return before, after, len(found)
 
 
-def at_time(expressions: Expressions, time: ca.MX, when: float) -> tuple[Expressions, Expressions]:
-    """Expressions before and after a time, with the values in place of what switches there by the time alone."""
-    flat = {name: inlined(expr) for name, expr in expressions.items()}
-    of_time = [node for node in nodes(ca.vertcat(*flat.values())) if node.op() in COMPARISONS and _only(node, time)]
-    step = 1e-9 * max(1.0, abs(when))
-    values = [[float(ca.Function("value", [time], [node])(at)) for at in (when - step, when + step)] for node in of_time]
-    switched = [(node, pair) for node, pair in zip(of_time, values, strict=True) if pair[0] != pair[1]]
-    chosen = [node for node, _ in switched]
-    return tuple(_replaced(flat, chosen, [ca.MX(pair[k]) for _, pair in switched]) for k in (0, 1))  # type: ignore[return-value]
-
-
-def value_at(condition: ca.MX, values: Mapping[str, tuple[ca.MX, tuple[float, float]]]) -> bool | None:
-    """Whether a condition holds at symbols within ranges; None where these do not tell."""
-    symbols = [symbol for symbol, _ in values.values()]
-    function = ca.Function("value", symbols, [condition], {"allow_free": True})
-    if function.has_free():
+def at_time(node: ca.MX, time: ca.MX, when: float) -> tuple[float, float] | None:
+    """The values of a comparison of time alone just before and after a time; None where it does not switch then."""
+    if [one.__hash__() for one in ca.symvar(node)] != [time.__hash__()]:
         return None
-    found = {float(function(*(limits[k] for _, limits in values.values()))) for k in (0, 1)}
+    step, function = 1e-9 * max(1.0, abs(when)), ca.Function("value", [time], [node])
+    before, after = (float(function(at)) for at in (when - step, when + step))
+    return (before, after) if before != after else None
+
+
+def value_at(condition: ca.MX, ranges: Mapping[int, tuple[float, float]]) -> bool | None:
+    """Whether a condition holds within ranges of its symbols, by their hashes; None where these do not tell."""
+    symbols = ca.symvar(condition)
+    if not all(symbol.__hash__() in ranges for symbol in symbols):
+        return None
+    function, corners = ca.Function("value", symbols, [condition]), product(*(ranges[symbol.__hash__()] for symbol in symbols))
+    found = {float(function(*corner)) for corner in corners}
     return bool(found.pop()) if len(found) == 1 else None
-
-
-def renamed(expressions: Expressions, old: Sequence[ca.MX], new: Sequence[ca.MX]) -> dict[str, ca.MX]:
-    """Expressions with new symbols in place of old ones."""
-    return {name: ca.substitute([expr], list(old), list(new))[0] for name, expr in expressions.items()}
-
-
-def halves(guess: Any) -> tuple[Any, Any]:
-    """A guess for a phase as guesses for its two parts: a straight line is cut in the middle."""
-    if isinstance(guess, tuple) and len(guess) == 2 and all(isinstance(value, float | int) for value in guess):
-        middle = 0.5 * (guess[0] + guess[1])
-        return (guess[0], middle), (middle, guess[1])
-    return guess, guess
-
-
-def _replaced(expressions: Expressions, old: list[ca.MX], new: list[ca.MX]) -> dict[str, ca.MX]:
-    return {name: ca.graph_substitute([expr], old, new)[0] if old else expr for name, expr in expressions.items()}
-
-
-def _only(node: ca.MX, symbol: ca.MX) -> bool:
-    """Whether a node depends on one symbol, and on no other."""
-    return bool([one.__hash__() for one in ca.symvar(node)] == [symbol.__hash__()])

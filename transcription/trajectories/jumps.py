@@ -1,7 +1,4 @@
-"""Where along a trajectory its rates, integrands, path constraints or peaks jump because a state or control crosses something.
-
-No derivative shows such a jump, and no simulation contradicts it: what a gradient solver takes for an optimum need not be one.
-"""
+"""Where along a trajectory its rates, integrands, path constraints or peaks jump because a state or control crosses something."""
 
 from __future__ import annotations
 
@@ -32,14 +29,13 @@ class Jump:
     how: str  # "crosses", or "touches or slides along" where the difference is 0 without a change of sign
 
     def __str__(self) -> str:
-        where = f"phase '{self.phase}' has a jump at t = {self.time:.5g} {self.time_unit}".rstrip()
-        place, end = f"it {self.how} the switch of {self.expression}", ""
-        if self.difference:
-            place = f"it {self.how} {self.difference} = 0, where {self.expression} switches"
-            end = f", and {self.difference} = 0 where they meet: phase.split does that for a comparison"
+        zero, junction = f"{self.difference} = 0, where {self.expression} switches", f", and {self.difference} = 0 where they meet"
+        place = zero if self.difference else f"the switch of {self.expression}"
+        when = f"phase '{self.phase}' has a jump at t = {self.time:.5g} {self.time_unit}".rstrip()
         return (
-            f"{where}: {place}, no derivative shows that, and {UNTRUSTED}. State two linked phases, with the values of both sides "
-            f"in place of {self.expression}, a path constraint that keeps each on its side{end}"
+            f"{when}: it {self.how} {place}, no derivative shows that, and {UNTRUSTED}. State two linked phases, with the values of "
+            f"both sides in place of {self.expression}, a path constraint that keeps each on its side"
+            f"{junction if self.difference else ''}: phase.split does that for a comparison"
         )
 
 

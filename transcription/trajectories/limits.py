@@ -15,13 +15,12 @@ from .trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory, wrappe
 
 DENSE = lobatto_nodes(33)
 """Places where an element is sampled, on [-1, 1]."""
-GAPS = np.diff(DENSE)
+GAPS, CLOSER = np.diff(DENSE), 17
+"""Distances between them, and samples of one that is looked at closer."""
 TWICE = np.concatenate([DENSE, DENSE[:-1] + 0.5 * GAPS])
 """These places and the middles of the gaps between them."""
 MIDDLES, SLOPES = lagrange_matrix(DENSE, TWICE[len(DENSE) :]), lagrange_derivative(DENSE, DENSE)
 """Values in the middles, and slopes at the places, of polynomials through values at the places."""
-CLOSER = 17
-"""Samples of a gap that is looked at closer."""
 NEGLIGIBLE_EXCESS = 1e-6
 """Excursions up to this, in scales, are those of a feasible point's tolerance."""
 
