@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from . import checks
 from .absolute import absolute_terms, radicand
@@ -186,17 +187,14 @@ class Phase:
     def split(self, condition: ca.MX, *, first: bool | None = None, name: str | None = None) -> Phase:
         """Cut the phase in two where a condition of its states switches, at a free time, so that nothing in either part jumps there.
 
-        This phase ends where the two sides of the comparison are equal; the phase that is returned goes on from there to the end. Each has
-        the value of the condition in place of it, in all rates and path constraints, and a path constraint that keeps it on its side. The
-        second phase may be split again, by another condition; one that switches back needs phases that are stated one by one.
-
-        To be called after `dynamics` and all paths, and before `tf`, `final`, `integral`, `peak` and links to later phases are used: those
-        belong to one of the two then.
+        This phase ends where both sides of the comparison are equal; the phase that is returned goes on from there. Each has the value of
+        the condition in its place, and a path constraint that keeps it on its side. Call it after `dynamics` and all paths, and before
+        `tf`, `final`, `integral`, `peak` and links to later phases are used. The second phase may be split again, by another condition.
 
         Parameters
         ----------
         condition : MX
-            A comparison as in `casadi.if_else(x > 0, ...)`, with which the rates, or path constraints, switch.
+            A comparison as in `casadi.if_else(x > 0, ...)`, with which rates or path constraints switch.
         first : bool, optional
             Its value before the switch; by default what it is at the initial states, as far as these tell.
         name : str, optional
@@ -206,11 +204,6 @@ class Phase:
         -------
         Phase
             The second one, with states and controls of its own of the same names: `after["x"]`.
-
-        Raises
-        ------
-        ValueError
-            If there is no such condition, quantities of the phase are used already, or it is not known which side comes first.
         """
         place = f"phase '{self.name}'"
         if not isinstance(condition, ca.MX) or condition.op() not in COMPARISONS or condition.numel() != 1:
@@ -247,8 +240,10 @@ class Phase:
     def _cut(self, parts: tuple[dict[str, ca.MX], dict[str, ca.MX], int], when: tuple[float, float], name: str | None) -> Phase:
         """The second of two parts of the phase, whose expressions are given; the phase itself becomes the first."""
         place, owner = f"phase '{self.name}'", self._owner
-        times = {symbol.__hash__() for expr in parts[0].values() for symbol in ca.symvar(expr)} & self._quantity_hashes
-        if times or any(self._quantities[kind] for kind in _KINDS if kind != "initial") or owner._uses_end(self):
+        stated = [*parts[0].values(), *(expr for _, expr in (*owner._objectives.values(), *owner._constraints.values()))]
+        ends = {self.t0.__hash__(), self.tf.__hash__()} & {symbol.__hash__() for expr in stated for symbol in ca.symvar(expr)}
+        later = any(list(owner._phases).index(self.name) == first for first, _ in owner._links)
+        if ends or later or any(self._quantities[kind] for kind in _KINDS if kind != "initial"):
             raise ValueError(f"{place}: cut it before its times, values at the end, integrals, peaks and links to later phases are used")
         after: Phase = owner.phase(name or f"{self.name} after", t0=when, tf=self._tf_range, time_unit=self._time_unit)
         for word, v in self._states.items():
@@ -262,19 +257,15 @@ class Phase:
         self._rates = {word: ours[word] for word in self._rates}
         for word, (limit, _) in list(self._paths.items()):
             self._paths[word], after._paths[word] = (limit, ours[word]), (limit, theirs[word])
-        for word, guess in list(self._guesses.items()):
-            if isinstance(guess, tuple) and isinstance(guess[0], float):  # a straight line of the whole phase
-                middle = 0.5 * (guess[0] + guess[1])
-                self._guesses[word], after._guesses[word] = (guess[0], middle), (middle, guess[1])
-            elif word != "t0":
-                after._guesses[word] = guess
+        # A straight line is a guess of the whole phase.
+        self._guesses = {word: guess for word, guess in self._guesses.items() if not (isinstance(guess, tuple) and np.ndim(guess) == 1)}
+        after._guesses = {word: guess for word, guess in self._guesses.items() if word != "t0"}
         self._guesses.pop("tf", None)
         self._tf_range = when
         owner.link(self, after)
         if self._duration != (0.0, float("inf")):
-            low, high = self._duration
-            owner.constraint(f"duration of {self.name}", after.tf - self.t0, lower=low, upper=None if high == float("inf") else high)
-            self._duration = (0.0, float("inf"))
+            (low, high), self._duration = self._duration, (0.0, float("inf"))
+            owner.constraint(f"duration of {self.name}", after.tf - self.t0, lower=low, upper=high if np.isfinite(high) else None)
         return after
 
     def guess(self, **values: Any) -> None:

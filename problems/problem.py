@@ -204,12 +204,6 @@ class Problem:
         check_links(compiled, labels)
         return with_sizes(compiled)
 
-    def _uses_end(self, phase: Phase) -> bool:
-        """Whether objectives or constraints have the time at which a phase ends, or a link leads out of it."""
-        pairs = (*self._objectives.values(), *self._constraints.values())
-        times = {symbol.__hash__() for _, expr in pairs for symbol in ca.symvar(expr)}
-        return phase.tf.__hash__() in times or any(list(self._phases).index(phase.name) == first for first, _ in self._links)
-
     def _objective(self, name: str, expr: Any, unit: str, sense: str, scale: float | None) -> None:
         what = checks.new_name("objective", name, self._objectives, f"problem '{self.name}'")
         factor = None if scale is None else checks.scale(scale, 1.0, what)

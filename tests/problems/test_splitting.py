@@ -90,7 +90,7 @@ def test_both_parts_have_what_the_phase_had():
     assert (one.states, one.controls) == (two.states, two.controls) and [one.name, two.name] == ["p", "p after"]
     assert (one.initial[0], one.final[0], two.final[0]) == ((-9, -1), (-9, 9), (2, 2)) and one.time_unit == two.time_unit == "min"
     assert (one.t0.lower, one.t0.upper, two.tf.lower, two.tf.upper) == (0, 1, 5, 6)
-    assert dict(one.guesses) == {"x": (-4, -1), "y": 0.5} and dict(two.guesses) == {"x": (-1, 2), "y": 0.5, "tf": 5.5}
+    assert dict(one.guesses) == {"y": 0.5} and dict(two.guesses) == {"y": 0.5, "tf": 5.5}
     # t, u, s with a = 0.5
     at = [-1.0, 0.3], 6.0, 2.0, [0, 5, 0.5]
     assert [np.array(phase.dynamics(*at)).ravel().tolist() for phase in (one, two)] == [[2.0, 0.3], [3.0, 0.3]]

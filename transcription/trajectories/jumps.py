@@ -74,29 +74,16 @@ class _Line:
         return self._jumping(self._at(gap, right), before, after, switch, "crosses")
 
     def touches(self) -> list[tuple[float, int, str]]:
-        """Time and switch wherever a difference is nearly 0 without a change of its sign, and something is another on the other side."""
-        size, inside = np.abs(self.differences), self.sides[1:-1]
-        least = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:]) & (size[1:-1] <= 0.1 * size.max(axis=0))
-        place, switch = np.nonzero(least & (inside == self.sides[:-2]) & (inside == self.sides[2:]))
-        if not len(place):
-            return []
-        left, right, each = place.astype(float), place + 2.0, np.arange(len(place))
-
-        def at(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return self._at(np.minimum(places.astype(int), len(size) - 2), places)
-
-        for _ in range(60):
-            one, other = left + (right - left) / 3.0, right - (right - left) / 3.0
-            nearer = np.less_equal(*(np.abs(self._switches(*at(places))[1])[each, switch] for places in (one, other)))
-            left, right = np.where(nearer, left, one), np.where(nearer, other, right)
-        values, times = at(left)
-        sides, differences = self._switches(values, times)
-        far, now = sides.copy(), sides[each, switch]
-        # The other side of a comparison, 0 or 1, and of a sign, -1 or 1.
-        far[each, switch] = np.where(now == 0.0, 1.0, np.where(self.sides.min(axis=0)[switch] < 0.0, -now, 0.0))
-        near = np.abs(differences)[each, switch] <= NEGLIGIBLE_EXCESS * size.max(axis=0)[switch]
-        found = self._jumping((values[near], times[near]), sides[near], far[near], switch[near], "touches or slides along")
-        return list({switch: (time, switch, how) for time, switch, how in sorted(found, reverse=True)}.values())
+        """Time and switch where a difference is first 0 at a sample without a change of its sign, and something is another on the other
+        side."""
+        near, inside = np.abs(self.differences) <= NEGLIGIBLE_EXCESS * np.abs(self.differences).max(axis=0), self.sides[1:-1]
+        place, switch = np.nonzero(near[1:-1] & (inside == self.sides[:-2]) & (inside == self.sides[2:]))
+        switch, first = np.unique(switch, return_index=True)
+        place = place[first] + 1
+        sides = self.sides[place]
+        far, each = sides.copy(), np.arange(len(place))
+        far[each, switch] = np.where(sides[each, switch] == 1.0, 0.0, 1.0)  # the other side of a comparison; of a sign, another one
+        return self._jumping((self.values[place], self.times[place]), sides, far, switch, "touches or slides along") if len(place) else []
 
     def _jumping(
         self, at: tuple[np.ndarray, np.ndarray], one: np.ndarray, other: np.ndarray, switch: np.ndarray, how: str
