@@ -16,7 +16,7 @@ from problems.compiled import CompiledPhase, CompiledProblem, Variable
 
 from ..base import NLP
 from ..numerics.polynomials import gauss_legendre, legendre_coefficients
-from ..trajectories.limits import DENSE, excess_by_element, paths_and_peaks
+from ..trajectories.limits import DENSE, Course, paths_and_peaks
 from ..trajectories.simulate import Simulation
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
@@ -103,19 +103,19 @@ def phase_errors(problem: CompiledProblem, trajectory: Trajectory, simulated: Si
 
 
 def _errors(phase: CompiledPhase, trajectory: PhaseTrajectory, simulated: PhaseTrajectory, parameters: np.ndarray) -> PhaseErrors:
-    excess = excess_by_element(phase, trajectory, parameters)
-    names = {v.name for v in phase.controls}
+    course = Course(phase, trajectory, parameters)
+    excess, highest = course.largest()
+    is_control = np.arange(len(phase.states), len(phase.states) + len(phase.controls))
     values, scales = trajectory.control.on_elements(DENSE), control_scales(trajectory)
-    nothing = np.zeros(len(values))
     controls, states = _coefficients(trajectory)
     share, integrand_rate = _quadrature(phase, trajectory, parameters)
-    peaks = _peak_shares(phase, trajectory, parameters)
+    peaks = _peak_shares(phase, trajectory, course.s, highest)
     defect = (np.abs(simulated.state.ends()[1] - trajectory.edge_states[1:]) / state_scales(trajectory)).max(axis=1)
     return PhaseErrors(
         defect=np.where(np.isfinite(defect), defect, np.inf),
         sums=np.maximum(share, peaks),
-        excess=np.max([nothing, *(amount for name, amount in excess.items() if name not in names)], axis=0),
-        leaving=np.max([nothing, *(amount for name, amount in excess.items() if name in names)], axis=0),
+        excess=np.delete(excess, is_control, axis=1).max(axis=1, initial=0.0),
+        leaving=excess[:, is_control].max(axis=1, initial=0.0),
         tail=_tails(controls),
         weight=_weights(trajectory),
         rate=decay_rates(states),
@@ -137,12 +137,10 @@ def _quadrature(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: n
     return _shares(error), rate
 
 
-def _peak_shares(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> np.ndarray:
-    """Shares (N,) in the error of peaks."""
-    x, u, times, s = trajectory.sampled(DENSE, parameters)
-    between = paths_and_peaks(phase, x, u, times, s)[1].reshape(len(trajectory.state.edges) - 1, len(DENSE), -1)
-    at_nodes = paths_and_peaks(phase, trajectory.states, trajectory.controls, trajectory.time, s)[1]
-    higher = np.maximum(between.max(axis=1) - at_nodes.max(axis=0), 0.0) / np.maximum(np.abs(at_nodes).max(axis=0), np.finfo(float).tiny)
+def _peak_shares(phase: CompiledPhase, trajectory: PhaseTrajectory, s: np.ndarray, highest: np.ndarray) -> np.ndarray:
+    """Shares (N,) in the error of peaks, which are `highest` (N, p)."""
+    nodes = paths_and_peaks(phase, trajectory.states, trajectory.controls, trajectory.time, s)[1]
+    higher = np.maximum(highest - nodes.max(axis=0), 0.0) / np.maximum(np.abs(nodes).max(axis=0), np.finfo(float).tiny)
     return _shares(np.nan_to_num(higher.max(axis=1, initial=0.0)))
 
 

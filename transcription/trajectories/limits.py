@@ -42,12 +42,15 @@ def paths_and_peaks(
 class Course:
     """All that is limited along one phase of N elements, and its peaks: q columns of states, controls, path constraints and peaks.
 
-    `state` has the polynomials of the states, `trajectory` those of the controls, `s` (ns,) t0, tf and the parameters; `values`
-    (N, len(DENSE), q) are those at the samples, `between` (N, len(GAPS), q) in the middle of the gaps between them.
+    The states are those of the trajectory, or of other polynomials `state`; `values` (N, len(DENSE), q) are those at the samples, `between`
+    (N, len(GAPS), q) in the middle of the gaps between them.
     """
 
-    def __init__(self, phase: CompiledPhase, state: PiecewisePolynomial, trajectory: PhaseTrajectory, s: np.ndarray) -> None:
-        self.phase, self.state, self.trajectory, self.s = phase, state, trajectory, s
+    def __init__(
+        self, phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray, state: PiecewisePolynomial | None = None
+    ) -> None:
+        self.phase, self.trajectory, self.s = phase, trajectory, np.array([trajectory.t0, trajectory.tf, *parameters])
+        self.state = state = trajectory.state if state is None else state
         x, u = state.on_elements(TWICE), trajectory.controls_on_elements(TWICE)
         values = self._columns(x, u, state.times(TWICE))
         self.values, self.between = values[:, : len(DENSE)], values[:, len(DENSE) :]
@@ -153,15 +156,8 @@ def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, fl
     found: dict[str, float] = {}
     parameters = np.array(list(trajectory.parameters.values()))
     for phase in problem.phases:
-        for name, amounts in excess_by_element(phase, trajectory[phase.name], parameters).items():
-            if amounts.max() > NEGLIGIBLE_EXCESS:
-                found[f"{phase.name}.{name}"] = float(amounts.max())
+        amounts, limits = Course(phase, trajectory[phase.name], parameters).largest()[0], (*phase.states, *phase.controls, *phase.paths)
+        for limit, amount in zip(limits, amounts.max(axis=0), strict=True):
+            if amount > NEGLIGIBLE_EXCESS:
+                found[f"{phase.name}.{limit.name}"] = float(amount)
     return found
-
-
-def excess_by_element(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> dict[str, np.ndarray]:
-    """Excursions (N,) of each state, control that is not periodic, and path constraint on each element, in scales."""
-    s = np.array([trajectory.t0, trajectory.tf, *parameters])
-    amounts, _ = Course(phase, trajectory.state, trajectory, s).largest()
-    limits: tuple[Variable | Limit, ...] = (*phase.states, *phase.controls, *phase.paths)
-    return {limit.name: amounts[:, i] for i, limit in enumerate(limits) if getattr(limit, "period", None) is None}

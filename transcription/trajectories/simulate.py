@@ -274,17 +274,16 @@ def _simulated_phase(phase: CompiledPhase, planned: PhaseTrajectory, elements: n
     """A simulated phase from states and integrals (N, len(DENSE), ny) on its elements."""
     nx, nu = len(phase.states), len(phase.controls)
     state = PiecewisePolynomial(planned.state.edges, elements[:, :, :nx], "lobatto")
-    s = np.concatenate([[planned.t0, planned.tf], parameters])
-    course = Course(phase, state, planned, s)
+    course = Course(phase, planned, parameters, state)
     beyond, highest = course.largest()
     # Where a control jumps, an end of two elements has two values of a path constraint: both are checked, the second is kept.
     kept = np.append(np.arange(elements.shape[0] * len(DENSE) - 1) % len(DENSE) != len(DENSE) - 1, True)
     times, values = state.times(DENSE).ravel()[kept], course.values.reshape(len(kept), -1)[kept]
     states, controls, paths, _ = np.split(values, np.cumsum([nx, nu, len(phase.paths)]), axis=1)
     trajectory = replace(planned, time=times, states=states, controls=controls, paths=paths, state=state)
-    initials = np.array(phase.initials(states[0], controls[0], times[0], s)).ravel()
-    finals = np.array(phase.finals(states[-1], controls[-1], times[-1], s)).ravel()
-    quantities = np.concatenate([s[:2], initials, finals, elements[-1, -1, nx:], highest.max(axis=0)])
+    initials = np.array(phase.initials(states[0], controls[0], times[0], course.s)).ravel()
+    finals = np.array(phase.finals(states[-1], controls[-1], times[-1], course.s)).ravel()
+    quantities = np.concatenate([course.s[:2], initials, finals, elements[-1, -1, nx:], highest.max(axis=0)])
     return _SimulatedPhase(planned, trajectory, quantities, beyond.max(axis=0), jumps(phase, course))
 
 
