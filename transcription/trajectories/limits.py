@@ -156,7 +156,8 @@ def excursions(problem: CompiledProblem, trajectory: Trajectory) -> dict[str, fl
     found: dict[str, float] = {}
     parameters = np.array(list(trajectory.parameters.values()))
     for phase in problem.phases:
-        amounts, limits = Course(phase, trajectory[phase.name], parameters).largest()[0], (*phase.states, *phase.controls, *phase.paths)
+        amounts, _ = Course(phase, trajectory[phase.name], parameters).largest()
+        limits: tuple[Variable | Limit, ...] = (*phase.states, *phase.controls, *phase.paths)
         for limit, amount in zip(limits, amounts.max(axis=0), strict=True):
             if amount > NEGLIGIBLE_EXCESS:
                 found[f"{phase.name}.{limit.name}"] = float(amount)
