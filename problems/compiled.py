@@ -253,6 +253,8 @@ class CompiledPhase(Deriving):
     """... and how large they mostly are within the bounds."""
     switching: Switching | None = None
     """Where rates, integrands, path constraints or peaks may jump."""
+    corners: tuple[float, ...] = ()
+    """Times at which tables of time have corners, if the phase's own times are fixed."""
 
     def __repr__(self) -> str:
         names = ([v.name for v in group] for group in (self.states, self.controls))

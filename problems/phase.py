@@ -11,7 +11,7 @@ import numpy as np
 from . import checks
 from .absolute import absolute_terms, radicand
 from .compiled import CompiledPhase, Limit, Variable, vector_function
-from .switching import COMPARISONS, at_time, same, sides, switching, value_at
+from .switching import COMPARISONS, at_time, corners, same, sides, switching, value_at
 
 _KINDS = ("initial", "final", "integral", "peak")
 
@@ -343,6 +343,7 @@ class Phase:
         sizes = roots | {row: expr.dep(0) for row, expr in enumerate(integrands) if expr.is_op(ca.OP_FABS)}
 
         varying = [*self._varying().values(), *integrands, *(expr for _, expr in self._quantities["peak"])]
+        fixed = all(lower == upper for lower, upper in (self._t0_range, self._tf_range))
 
         return CompiledPhase(
             name=self.name,
@@ -366,4 +367,5 @@ class Phase:
             sized=tuple(sizes),
             switching=switching(groups, varying, [self.time, self.t0, self.tf]),
             roots=tuple(row in roots for row in sizes),
+            corners=corners(varying, self.time, (self._t0_range[0], self._tf_range[0])) if fixed else (),
         )

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 
 import casadi as ca
 import numpy as np
 
 COMPARISONS = (ca.OP_LT, ca.OP_LE)
+MOST_CORNERS = 100
+"""Corners of tables in a phase, so many that a mesh with an edge at each is no larger than others that are refined."""
 STEPPED = (*COMPARISONS, ca.OP_SIGN, ca.OP_EQ, ca.OP_NE, ca.OP_FLOOR, ca.OP_CEIL)
 
 
@@ -133,3 +135,33 @@ def value_at(condition: ca.MX, ranges: Mapping[int, tuple[float, float]]) -> boo
     function, corners = ca.Function("value", symbols, [condition]), product(*(ranges[symbol.__hash__()] for symbol in symbols))
     found = {float(function(*corner)) for corner in corners}
     return bool(found.pop()) if len(found) == 1 else None
+
+
+def corners(expressions: Sequence[ca.MX], time: ca.MX, ends: tuple[float, float]) -> tuple[float, ...]:
+    """The times between two at which tables of time have corners, or comparisons of time switch; without any, or with more than
+    `MOST_CORNERS`, none. Tables are linear interpolants of expressions that are linear in time."""
+    seen: list[ca.MX] = []
+    for node in nodes(inlined(ca.vertcat(*expressions))):
+        called = node.dep(0) if node.is_output() else None
+        table = called is not None and called.which_function().class_name() == "LinearInterpolant" and called.dep(0).numel() == 1
+        if (table or node.op() in COMPARISONS) and [one.__hash__() for one in ca.symvar(node)] == [time.__hash__()]:
+            line = called.dep(0) if table and called is not None else node.dep(0) - node.dep(1)
+            if ca.jacobian(line, time).is_constant():
+                seen.append(ca.jacobian(node, time) if table else node)
+    if not seen or not ends[0] < ends[1]:
+        return ()
+    function, found = ca.Function("steps", [time], [ca.densify(ca.vertcat(*seen))]), list[float]()
+    grid = np.linspace(*ends, 1025)
+    left = list(zip(pairwise(grid.tolist()), pairwise(np.array(function(grid[None])).T), strict=True))
+    while left and len(found) <= MOST_CORNERS:
+        (a, b), (at_a, at_b) = left.pop()
+        middle = 0.5 * (a + b)
+        if not np.allclose(at_a, at_b, rtol=1e-9, atol=0.0):
+            if b - a < 1e-12 * (ends[1] - ends[0]) or not a < middle < b:
+                found.append(middle)
+            else:
+                at_middle = np.array(function(middle)).ravel()
+                left += [((a, middle), (at_a, at_middle)), ((middle, b), (at_middle, at_b))]
+    near = 1e-9 * (ends[1] - ends[0])
+    inside = sorted(time for time in found if ends[0] + near < time < ends[1] - near)
+    return tuple(inside) if len(found) <= MOST_CORNERS else ()

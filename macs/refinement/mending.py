@@ -260,7 +260,7 @@ class _Mending:
         job.go(self.show)
         again = self.marked(job.points(0.0, ""))
         # What refinement would wish for besides is no complaint about a point that is verified.
-        return again.replace(notes=["" if i in job.found and again.verified[i] else note for i, note in enumerate(again.notes)])
+        return again.replace(notes=["" if i in rows and again.verified[i] else note for i, note in enumerate(again.notes)])
 
     def _most_work(self, points: Points, count: int, fine: Meshed | None = None) -> float:
         """The work left for so many points, in iterations times variables; no limit where there was no search, so that the mesh is the

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledPhase, CompiledProblem
 from problems.problem import Problem
 from transcription import DFET
 from transcription.base import NLP, Transcription
@@ -79,13 +79,24 @@ def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
 
 
 def coarse_meshes(problem: Problem | CompiledProblem) -> list[Meshed]:
-    """Meshes to begin on, in their order: meshes fine enough for a guess and for oscillations, the problem's own, and coarse ones."""
-    own = default_transcription(problem)
+    """Meshes to begin on, in their order: meshes fine enough for a guess, the problem's own, and coarse ones; with edges at the corners of
+    tables."""
+    own, compiled = default_transcription(problem), problem.compile()
     coarse = list(dict.fromkeys([own, *COARSE] if isinstance(own, Meshed) else COARSE))
-    elements = max(guessed_elements(problem.compile()), swinging_elements(problem.compile()))
+    elements = guessed_elements(compiled)
     if elements > coarse[0].elements:
         coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
-    return coarse
+    return [method.remeshed({phase.name: _cornered(method, phase) for phase in compiled.phases if phase.corners}) for method in coarse]
+
+
+def _cornered(method: Meshed, phase: CompiledPhase) -> PhaseMesh:
+    """The mesh of a phase with edges at the corners of its tables; elements between two of these are no longer than those that it has."""
+    old, t0, tf = method.mesh_of(phase.name), phase.t0.lower, phase.tf.lower
+    ends = np.array([t0, *phase.corners, tf])
+    shares = (ends - t0) / (tf - t0)
+    counts = np.ceil(np.diff(shares) * old.elements - 1e-9).astype(int)
+    edges = np.interp(np.concatenate([k + np.arange(count) / count for k, count in enumerate(counts)]), np.arange(len(ends)), shares)
+    return PhaseMesh((*edges.tolist(), 1.0), old.order, old.control_order)
 
 
 def guessed_elements(problem: CompiledProblem) -> int:
@@ -447,7 +458,7 @@ def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
         # How long the element without an edge would be, in those that the meshes have there.
         excess = joined / np.array([min(_length_at(mesh, edge) for mesh in meshes) for edge in edges[1:-1]])
         k = int(np.argmin(excess))
-        if excess[k] > 1.0 + SEARCH.near and len(edges) - 1 <= SEARCH.elements:
+        if excess[k] > 1.0 + SEARCH.near and len(edges) - 1 <= max(SEARCH.elements, *(mesh.elements for mesh in meshes)):
             break
         del edges[k + 1]
     orders = [mesh.control_order for mesh in meshes]
