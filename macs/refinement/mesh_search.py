@@ -444,12 +444,12 @@ def _chosen(search: MeshSearch, limits: float) -> SearchMeshes:
 
 def _common(methods: Sequence[Meshed], problem: CompiledProblem) -> Meshed:
     """DFET on one mesh that has the elements and degrees of several."""
-    meshes = {phase.name: _together([method.mesh_of(phase.name) for method in methods]) for phase in problem.phases}
+    meshes = {phase.name: _together([method.mesh_of(phase.name) for method in methods], len(phase.corners)) for phase in problem.phases}
     basis = "lobatto" if all(getattr(method, "basis", "") == "lobatto" for method in methods) else "bernstein"
     return DFET(COARSE[0].elements, COARSE[0].order, basis=basis, mesh=meshes)
 
 
-def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
+def _together(meshes: Sequence[PhaseMesh], corners: int = 0) -> PhaseMesh:
     """A mesh with the edges of several, without edges that would make elements shorter than in any single mesh. Its degree is one above
     theirs: points between the ends may be harder than these."""
     edges = sorted({edge for mesh in meshes for edge in mesh.edges})
@@ -458,7 +458,7 @@ def _together(meshes: Sequence[PhaseMesh]) -> PhaseMesh:
         # How long the element without an edge would be, in those that the meshes have there.
         excess = joined / np.array([min(_length_at(mesh, edge) for mesh in meshes) for edge in edges[1:-1]])
         k = int(np.argmin(excess))
-        if excess[k] > 1.0 + SEARCH.near and len(edges) - 1 <= max(SEARCH.elements, *(mesh.elements for mesh in meshes)):
+        if excess[k] > 1.0 + SEARCH.near and len(edges) - 1 <= SEARCH.elements + corners:
             break
         del edges[k + 1]
     orders = [mesh.control_order for mesh in meshes]
