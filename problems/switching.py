@@ -13,8 +13,6 @@ import casadi as ca
 import numpy as np
 
 COMPARISONS = (ca.OP_LT, ca.OP_LE)
-MOST_CORNERS = 100
-"""Corners of tables in a phase, so many that a mesh with an edge at each is no larger than others that are refined."""
 STEPPED = (*COMPARISONS, ca.OP_SIGN, ca.OP_EQ, ca.OP_NE, ca.OP_FLOOR, ca.OP_CEIL)
 
 
@@ -101,6 +99,7 @@ def nodes(expression: ca.MX) -> list[ca.MX]:
     return list(seen.values())
 
 
+<<<<<<< HEAD
 def sides(
     expressions: Mapping[str, ca.MX], values: Callable[[ca.MX], tuple[float, float] | None]
 ) -> tuple[dict[str, ca.MX], dict[str, ca.MX], int]:
@@ -138,8 +137,11 @@ def value_at(condition: ca.MX, ranges: Mapping[int, tuple[float, float]]) -> boo
 
 
 def corners(expressions: Sequence[ca.MX], time: ca.MX, ends: tuple[float, float]) -> tuple[float, ...]:
+=======
+def corners(expressions: Sequence[ca.MX], time: ca.MX, ends: tuple[float, float], most: int = 100) -> tuple[float, ...]:
+>>>>>>> 314a6959 (One name less)
     """The times between two at which tables of time have corners, or comparisons of time switch; without any, or with more than
-    `MOST_CORNERS`, none. Tables are linear interpolants of expressions that are linear in time."""
+    `most`, none. Tables are linear interpolants of expressions that are linear in time."""
     seen: list[ca.MX] = []
     for node in nodes(inlined(ca.vertcat(*expressions))):
         called = node.dep(0) if node.is_output() else None
@@ -153,7 +155,7 @@ def corners(expressions: Sequence[ca.MX], time: ca.MX, ends: tuple[float, float]
     function, found = ca.Function("steps", [time], [ca.densify(ca.vertcat(*seen))]), list[float]()
     grid = np.linspace(*ends, 1025)
     left = list(zip(pairwise(grid.tolist()), pairwise(np.array(function(grid[None])).T), strict=True))
-    while left and len(found) <= MOST_CORNERS:
+    while left and len(found) <= most:
         (a, b), (at_a, at_b) = left.pop()
         middle = 0.5 * (a + b)
         if not np.allclose(at_a, at_b, rtol=1e-9, atol=0.0):
@@ -164,4 +166,4 @@ def corners(expressions: Sequence[ca.MX], time: ca.MX, ends: tuple[float, float]
                 left += [((a, middle), (at_a, at_middle)), ((middle, b), (at_middle, at_b))]
     near = 1e-9 * (ends[1] - ends[0])
     inside = sorted(time for time in found if ends[0] + near < time < ends[1] - near)
-    return tuple(inside) if len(found) <= MOST_CORNERS else ()
+    return tuple(inside) if len(found) <= most else ()
