@@ -99,7 +99,6 @@ def nodes(expression: ca.MX) -> list[ca.MX]:
     return list(seen.values())
 
 
-<<<<<<< HEAD
 def sides(
     expressions: Mapping[str, ca.MX], values: Callable[[ca.MX], tuple[float, float] | None]
 ) -> tuple[dict[str, ca.MX], dict[str, ca.MX], int]:
@@ -136,10 +135,7 @@ def value_at(condition: ca.MX, ranges: Mapping[int, tuple[float, float]]) -> boo
     return bool(found.pop()) if len(found) == 1 else None
 
 
-def corners(expressions: Sequence[ca.MX], time: ca.MX, ends: tuple[float, float]) -> tuple[float, ...]:
-=======
 def corners(expressions: Sequence[ca.MX], time: ca.MX, ends: tuple[float, float], most: int = 100) -> tuple[float, ...]:
->>>>>>> 314a6959 (One name less)
     """The times between two at which tables of time have corners, or comparisons of time switch; without any, or with more than
     `most`, none. Tables are linear interpolants of expressions that are linear in time."""
     seen: list[ca.MX] = []
