@@ -19,7 +19,7 @@ def indicators(front: Front, reference: np.ndarray) -> tuple[float, float]:
 def test_goddard_on_the_papers_mesh() -> None:
     reference = goddard.reference()
     distances, defects = [], []
-    for seed in range(1, 6):
+    for seed in (1, 2, 3):
         front = MACS(agents=10, archive=10, refine=False).solve(load("goddard"), DFET(4, 6), evaluations=10_000, seed=seed)
         assert front.stats["evaluations"] <= 10_000
         assert len(front) == 10
@@ -35,7 +35,7 @@ def test_goddard_on_the_papers_mesh() -> None:
 
 
 def test_orbit_rise_on_the_papers_mesh() -> None:
-    for seed in range(1, 6):
+    for seed in (1, 2, 3):
         front = MACS(agents=10, archive=10, refine=False).solve(load("orbit_rise"), DFET(30, 1), evaluations=10_000, seed=seed)
         distance, inverted = indicators(front, orbit_rise.reference())
         defect = np.median([point.simulate(rtol=1e-10).max_defect for point in front])
@@ -55,7 +55,7 @@ def test_orbit_rise_on_the_papers_mesh() -> None:
 )
 def test_with_gradients_the_front_is_as_exact_as_its_mesh(case, mesh, truth, evaluations, limit) -> None:
     """The meshes' own distances from the truth are 2.1e-5 and 2.6e-5, ten evenly spread points have an IGD of 0.0413 and 0.0394."""
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         front = MACS().solve(load(case), mesh, evaluations=evaluations, seed=seed)
         distance, inverted = indicators(front, truth.reference())
         worst, solves = max(point.optimality for point in front), front.stats["gradient_solves"]
