@@ -57,7 +57,7 @@ def recorded(monkeypatch) -> list[np.ndarray]:
     return starts
 
 
-def test_they_are_sought_from_what_was_given_or_guessed(monkeypatch) -> None:
+def test_they_begin_at_what_was_given_or_guessed_and_not_at_its_propagated_states(monkeypatch) -> None:
     starts = recorded(monkeypatch)
     evaluator = evaluator_of_vectors()
     rng = np.random.default_rng(3)
@@ -69,6 +69,14 @@ def test_they_are_sought_from_what_was_given_or_guessed(monkeypatch) -> None:
     monkeypatch.setattr(gradient_actions, "guessed_start", lambda nlp: given[:1])
     MACS(agents=4).begin(evaluator_of_vectors(), 200, rng)
     np.testing.assert_array_equal(starts[1], given[:1])
+    starts.clear()
+    nlp = METHOD.nlp(walk().compile())
+    given = np.clip(nlp.first_guess(nlp.lower[nlp.free][None]) + 0.1, nlp.lower, nlp.upper)
+    for inner in ("propagate", "auto"):
+        MACS(agents=4).begin(Bilevel(nlp, inner_solver(inner), 1e-6), 60, np.random.default_rng(3), given)
+    assert len(starts) == 2 and not np.allclose(nlp.propagate(given), given)
+    np.testing.assert_array_equal(starts[0], given)
+    np.testing.assert_array_equal(starts[1], given)
 
 
 def projecting(problem: Problem, method) -> Bilevel:
@@ -89,7 +97,7 @@ def walk(least: float = -9.0) -> Problem:
     return problem
 
 
-def test_where_the_way_is_chosen_solves_find_points_along_the_front() -> None:
+def test_where_the_way_is_chosen_solves_find_points_along_the_front(monkeypatch) -> None:
     evaluator = projecting(walk(), METHOD)
     state = begun(evaluator, archive=6)
     assert evaluator.counts.evaluations == 6 and evaluator.counts.fallbacks == 0, "candidates were propagated"
@@ -97,6 +105,21 @@ def test_where_the_way_is_chosen_solves_find_points_along_the_front() -> None:
     effort = 12 / 3.0**3  # of the way in 3 seconds, on which the control is a straight line
     assert state.ideal[1] == pytest.approx(effort, rel=1e-4) and len(state.optima) >= 6
     assert state.ideal[0] == pytest.approx(2 / np.sqrt(5), rel=1e-2), "full thrust, then none: 2 sqrt(1 / 5)"
+    # Ends that were alike are not sought again where others were not; no other start finds a worse optimum.
+    assert state.gradients.unimodal.all() and not state.gradients.multimodal
+    rng, tasks, original = np.random.default_rng(1), [], MultistartSolver.from_vector
+    found, worse = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, state.gradients.unimodal, rng)
+    assert not worse and len(found.F) >= 6
+
+    def noted(self, start, task):
+        tasks.append(np.flatnonzero(task.weights).tolist())
+        return original(self, start, task)
+
+    monkeypatch.setattr(MultistartSolver, "from_vector", noted)
+    for alike, ends in (([True, True], [[0], [1], [0], [1]]), ([True, False], [[1]] * 4)):
+        tasks.clear()
+        gradient_actions.restart_solves(state.archive, evaluator, 6, 6, 0, np.array(alike), np.random.default_rng(1))
+        assert tasks == [*ends[:2], [0, 1], *ends[2:], [0, 1]], "two of three are ends"
 
 
 def test_where_solves_for_feasibility_find_nothing_no_candidate_is_projected() -> None:
@@ -118,39 +141,8 @@ def test_what_nothing_makes_feasible_is_projected(monkeypatch) -> None:
     assert few.counts.evaluations == 13, "as far as the budget goes"
 
 
-def test_they_begin_at_what_was_given_and_not_at_its_propagated_states(monkeypatch) -> None:
-    starts = recorded(monkeypatch)
-    nlp = METHOD.nlp(walk().compile())
-    given = np.clip(nlp.first_guess(nlp.lower[nlp.free][None]) + 0.1, nlp.lower, nlp.upper)
-    for inner in ("propagate", "auto"):
-        MACS(agents=4).begin(Bilevel(nlp, inner_solver(inner), 1e-6), 60, np.random.default_rng(3), given)
-    assert len(starts) == 2 and not np.allclose(nlp.propagate(given), given)
-    np.testing.assert_array_equal(starts[0], given)
-    np.testing.assert_array_equal(starts[1], given)
-
-
-@pytest.mark.parametrize(
-    ("multimodal", "problem", "method"), [(False, walk(), METHOD), (True, load("landing_site", landers=1), DFET(1, 3))]
-)
-def test_worse_optima_from_other_starts_are_noticed(multimodal, problem, method) -> None:
-    evaluator = projecting(problem, method)
+def test_worse_optima_from_other_starts_are_noticed() -> None:
+    evaluator = projecting(load("landing_site", landers=1), DFET(1, 3))
     state = begun(evaluator, archive=6)
     found, worse = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, state.gradients.unimodal, np.random.default_rng(1))
-    assert worse is multimodal and len(found.F) >= 6
-
-
-def test_ends_that_were_alike_are_not_sought_again_where_others_were_not(monkeypatch) -> None:
-    evaluator, tasks = projecting(walk(), METHOD), []
-    state = begun(evaluator, archive=6)
-    assert state.gradients.unimodal.all() and not state.gradients.multimodal
-    original = MultistartSolver.from_vector
-
-    def noted(self, start, task):
-        tasks.append(np.flatnonzero(task.weights).tolist())
-        return original(self, start, task)
-
-    monkeypatch.setattr(MultistartSolver, "from_vector", noted)
-    for alike, ends in (([True, True], [[0], [1], [0], [1]]), ([True, False], [[1]] * 4)):
-        tasks.clear()
-        gradient_actions.restart_solves(state.archive, evaluator, 6, 6, 0, np.array(alike), np.random.default_rng(1))
-        assert tasks == [*ends[:2], [0, 1], *ends[2:], [0, 1]], "two of three are ends"
+    assert worse is True and len(found.F) >= 6

@@ -134,10 +134,13 @@ def test_what_was_kept_comes_back(path: Path, seed: int | None) -> None:
             assert np.array_equal(getattr(getattr(what, name), part), getattr(getattr(state(), name), part))
 
 
-@pytest.mark.parametrize(
+FAILING = pytest.mark.parametrize(
     ("error", "reason"),
     [(OSError(errno.EIO, "Input/output error"), "Input/output error"), (OSError("the tape is stuck"), "the tape is stuck")],
 )
+
+
+@FAILING
 def test_a_file_that_cannot_be_read_says_why(path: Path, monkeypatch: pytest.MonkeyPatch, error: OSError, reason: str) -> None:
     def fails(path: Path) -> None:
         raise error
@@ -192,10 +195,7 @@ def test_writes_are_a_while_apart(path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert not after(0.9 * WRITE_SHARE * took) and after(0.2 * WRITE_SHARE * took)
 
 
-@pytest.mark.parametrize(
-    ("error", "reason"),
-    [(OSError(errno.ENOSPC, "No space left on device"), "No space left on device"), (OSError("the tape is stuck"), "the tape is stuck")],
-)
+@FAILING
 def test_a_write_that_fails_is_logged_once_and_tried_again(
     path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, error: OSError, reason: str
 ) -> None:
