@@ -151,7 +151,7 @@ def test_points_are_judged_by_what_they_are_told_with():
     assert len(H) == 1 or np.abs(H).max() <= 1e-4
 
 
-def test_the_budget_is_never_exceeded():
+def test_the_budget_is_that_of_the_termination_and_never_exceeded():
     for termination, most in (
         (("n_eval", 7), 7),
         (("n_eval", 503), 503),
@@ -161,9 +161,6 @@ def test_the_budget_is_never_exceeded():
     ):
         res = minimize(get_problem("zdt1"), MACS(), termination, seed=1)
         assert res.algorithm.evaluator.n_eval == most
-
-
-def test_the_budget_that_a_termination_has():
     both = get_termination("n_eval", 100), get_termination("n_gen", 5)
     assert most_evaluations(TerminationCollection(*both)) == 100
     assert most_evaluations(TerminateIfAll(*both)) == np.inf == most_evaluations(NoTermination())
@@ -330,7 +327,7 @@ def test_what_is_told_has_to_be_what_was_asked_for():
         MACS().next()
 
 
-def test_first_points_are_a_start():
+def test_first_points_are_a_start_and_evaluated_ones_are_not_evaluated_again():
     problem = get_problem("zdt1", n_var=4)
     X = np.random.default_rng(0).random((30, 4))
     front = macs.MACS(archive=15).minimize(problem, evaluations=300, seed=1, start=X)
@@ -341,11 +338,6 @@ def test_first_points_are_a_start():
     assert np.array_equal(ready(problem, sampling=beyond).ask().get("X")[:2], np.clip(beyond, 0, 1)) and beyond.max() > 1
     few = minimize(problem, MACS(archive=10, sampling=X[0]), ("n_gen", 1), seed=1)
     assert few.algorithm.evaluator.n_eval == 10 and np.array_equal(few.algorithm.off[0].X, X[0])
-
-
-def test_evaluated_points_are_not_evaluated_again():
-    problem = get_problem("zdt1", n_var=4)
-    X = np.random.default_rng(0).random((30, 4))
     known = Evaluator().eval(problem, Population.new(X=X))
     res = minimize(problem, MACS(archive=15, sampling=known), ("n_eval", 300), seed=1)
     front = macs.MACS(archive=15).minimize(problem, evaluations=330, seed=1, start=X)
@@ -372,14 +364,11 @@ def test_wrong_first_points_are_refused(X, message):
         minimize(get_problem("zdt1", n_var=2), MACS(sampling=X), ("n_eval", 50))
 
 
-def test_failed_evaluations_stop_nothing():
+def test_failed_evaluations_stop_nothing_and_where_all_fail_there_is_no_result():
     res = minimize(Holes(), MACS(archive=10), ("n_eval", 800), seed=2, verbose=False)
     assert np.isfinite(res.F).all() and len(res.F) == 10 and ((np.abs(res.X - 1) >= 0.5) & (np.abs(res.X - 1) <= 1 + 1e-3)).all()
     front = macs.MACS().minimize(Holes(), evaluations=800, seed=2)
     assert np.array_equal(ordered(res.X, res.F), of(front))
-
-
-def test_where_all_fails_there_is_no_result():
     res = minimize(Holes(everywhere=True), MACS(), ("n_eval", 200), seed=1)
     assert res.X is None and res.F is None and res.opt is None and np.isinf(res.pop.get("CV")).all()
     assert res.algorithm.evaluator.n_eval == 200

@@ -112,7 +112,7 @@ def along(point, direction: np.ndarray) -> np.ndarray:
     return found.F * problem.signs
 
 
-def test_the_matrix_agrees_with_differences_along_its_own_directions():
+def test_matrix_and_rates_agree_with_differences_along_directions_and_of_other_optima():
     point = optimum(carts(slope=0.8), parse(MESH), 2.0, 1.5)[0]
     found = trade_offs(point)
     assert found.directions.shape == (3, len(point.decision))
@@ -120,6 +120,11 @@ def test_the_matrix_agrees_with_differences_along_its_own_directions():
         less, more = along(point, found.directions[i])
         assert (more - less)[i] == pytest.approx(-2e-3 * goal.sign, rel=1e-4), "better by one unit"
         assert (more - less) / (more - less)[i] == pytest.approx(found.matrix[i], rel=1e-3, abs=1e-5)
+    # With the third objective held, at the nearest optima of a cart whose front is not known in closed form.
+    problem, method, h = carts(slope=0.8), parse(MESH), 0.02
+    for name, shift in (("time", (h, 0.0)), ("distance", (0.0, h))):
+        less, more = (optimum(problem, method, 2.0 + s * shift[0], 1.5 + s * shift[1])[0].objectives["effort"] for s in (-1, 1))
+        assert found.rate("effort", name) == pytest.approx((more - less) / (2 * h), rel=1e-3)
 
 
 def test_no_direction_of_the_same_length_is_better():
@@ -313,15 +318,6 @@ def test_rates_are_the_slope_of_the_front_in_closed_form(ascents):
             assert not found.messages
             assert found.bounds("flight time", "horizontal speed") == pytest.approx((1 / slope, 1 / slope), rel=1e-3)
         assert found.matrix == pytest.approx(exact, rel=1e-3, nan_ok=True)
-
-
-def test_rates_of_three_objectives_agree_with_differences_of_other_optima():
-    """With the third objective held, at the nearest optima of a cart whose front is not known in closed form."""
-    problem, method, h = carts(slope=0.8), parse(MESH), 0.02
-    found = trade_offs(optimum(problem, method, 2.0, 1.5)[0])
-    for name, shift in (("time", (h, 0.0)), ("distance", (0.0, h))):
-        less, more = (optimum(problem, method, 2.0 + s * shift[0], 1.5 + s * shift[1])[0].objectives["effort"] for s in (-1, 1))
-        assert found.rate("effort", name) == pytest.approx((more - less) / (2 * h), rel=1e-3)
 
 
 def moved(front: Front, by: float, seed: int) -> Front:

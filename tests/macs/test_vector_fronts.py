@@ -141,16 +141,13 @@ def test_a_saved_front_is_evaluated_again_with_its_problem(front, tmp_path):
     assert again.verify(1e-9).verified.all() and again[0].simulate().objectives == truss[0].objectives
 
 
-def test_points_that_are_not_what_they_say_are_not_verified(front):
+def test_what_is_not_what_it_says_is_not_verified_and_other_data_evaluate_the_same_points(front):
     wrong = front.replace(F=front.F + np.eye(10, 2) * 0.1 * np.ptp(front.F, axis=0))
     marked = wrong.verify()
     assert marked.verified.tolist() == [False, False] + [True] * 8
     assert "evaluated again, its 'near' differs by 0.2" in marked[0].note and marked[0].note.endswith("m2")
     assert "Not verified: evaluated again, these differ by more than 0.001." in marked.table()
     assert [check.ok for check in verify(wrong, tolerance=1e-6)] == [False, False] + [True] * 8
-
-
-def test_other_data_evaluate_the_same_points(front):
     other = front.simulate(parabolas(wall=1.0))
     x = front.decision[:, 0]
     assert np.allclose(other.violation, np.maximum(x - 1.0, 0.0)) and (other.status == np.where(x > 1.01, "infeasible", "converged")).all()
