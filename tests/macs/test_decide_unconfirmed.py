@@ -53,11 +53,6 @@ def end(T: float) -> float:
     return np.cos(T) + 0.3 * (3 + np.cos(T))
 
 
-def time(x: float) -> float:
-    """That of the largest end."""
-    return brentq(lambda T: end(T) - x, 3.2, 6.0)
-
-
 BOTH = Ranges({"end": end(6.0), "time": 3.2}, {"end": end(3.2), "time": 6.0})
 WIDE = end(6.0) - end(3.2)
 
@@ -88,7 +83,7 @@ WISHES: list[tuple[Preference, float]] = [
     (FuzzyGoal({"end": 0.0, "time": 5.5}), 5.5),
     # What the mesh of the first solve attains of the first goal is not what there is to be kept.
     (GoalProgramming({"end": end(6.0), "time": 3.2}, priorities=["end", "time"]), 6.0),
-    (GoalProgramming({"end": 1.5, "time": 3.2}, priorities=["end", "time"]), time(1.5)),
+    (GoalProgramming({"end": 1.5, "time": 3.2}, priorities=["end", "time"]), brentq(lambda T: end(T) - 1.5, 3.2, 6.0)),
     (EVEN, 0.0),
 ]
 

@@ -61,15 +61,11 @@ def ctrl_c(after: float):
         timer.cancel()
 
 
-def endless() -> Watched:
-    """A program that IPOPT would work on for minutes: a chain of narrow valleys, from the wrong end."""
+def test_a_time_limit_ends_a_solve_between_its_iterations_and_ctrl_c_is_not_swallowed():
+    """Of a program that IPOPT would work on for minutes: a chain of narrow valleys, from the wrong end."""
     x = ca.SX.sym("x", 3000)
     f = ca.sum1(100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2)
-    return Watched("valleys", {"x": x, "f": f}, ipopt_options(600.0, 10**6))
-
-
-def test_a_time_limit_ends_a_solve_between_its_iterations_and_ctrl_c_is_not_swallowed():
-    solver = endless()
+    solver = Watched("valleys", {"x": x, "f": f}, ipopt_options(600.0, 10**6))
     with Interrupts(LIMIT), within(BOUND):
         solver(x0=-1.0)
     stats = solver.stats()
@@ -151,12 +147,6 @@ def stiff() -> Problem:
     return problem
 
 
-def stiff_front() -> Front:
-    nlp = DFET(20, 1).transcribe(stiff())
-    Z = nlp.propagate(nlp.first_guess(np.full((2, len(nlp.free)), 0.5)))
-    return Front.of(from_vectors(nlp, Z, {"name": "nothing"}, {"tolerance": 1e-3}))
-
-
 @pytest.fixture
 def endless_integrations(monkeypatch):
     """On a quick machine an integration may break down, after as many steps as it may have, before the clock ends it."""
@@ -164,7 +154,9 @@ def endless_integrations(monkeypatch):
 
 
 def test_a_time_limit_ends_a_simulation(endless_integrations):
-    front = stiff_front()
+    nlp = DFET(20, 1).transcribe(stiff())
+    Z = nlp.propagate(nlp.first_guess(np.full((2, len(nlp.free)), 0.5)))
+    front = Front.of(from_vectors(nlp, Z, {"name": "nothing"}, {"tolerance": 1e-3}))
     with Interrupts(LIMIT), within(BOUND), pytest.raises(Stopped, match="time limit"):
         simulate(front.compiled(), front[0].trajectory)
     with Interrupts(LIMIT), within(BOUND):

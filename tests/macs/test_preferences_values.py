@@ -277,10 +277,6 @@ T0, T1, E0, E1 = FASTEST, SLOWEST, 12 / SLOWEST**3, 12 / FASTEST**3
 DT, DE = T1 - T0, E1 - E0
 
 
-def effort(T: float) -> float:
-    return 12 / T**3
-
-
 def balanced(time_weight: float, effort_weight: float) -> float:
     """Where time_weight * T + effort_weight * 12 / T^3 is least."""
     return (36 * effort_weight / time_weight) ** 0.25
@@ -320,7 +316,7 @@ def test_beyond_a_tolerance_no_point_is_acceptable():
     assert np.isinf(none.values).all()
     assert none.message == "No point meets all hard limits together."
     # The excesses over 1.4 s and 0.3 are in units of the tolerances.
-    T = brentq(lambda T: (T - 1.4) / 0.1 - (effort(T) - 0.3) / 0.1, T0, T1)
+    T = brentq(lambda T: (T - 1.4) / 0.1 - (12 / T**3 - 0.3) / 0.1, T0, T1)
     assert none.best.objectives["time"] == pytest.approx(T, abs=STEP)
 
 

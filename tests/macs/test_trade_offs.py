@@ -241,7 +241,8 @@ def test_weights_are_not_moved_by_what_tells_multipliers_apart():
 def test_a_peak_as_an_objective(method):
     """Time T against the largest squared thrust, 16/T^4, which is bang-bang: every control is at the peak, and moves with it."""
     nlp = method.nlp(shuttle())
-    found = scalarize(nlp, nlp.first_guess(np.array([np.where(np.isfinite(nlp.guess), nlp.guess, 0.1)]))[0], **limited(2.0))
+    start = nlp.first_guess(np.array([np.where(np.isfinite(nlp.guess), nlp.guess, 0.1)]))[0]
+    found = scalarize(nlp, start, reference=np.array([2.0, 0.0]), weights=np.array([0.0, 1.0]))
     point = as_front(nlp, found.z)[0]
     assert point.objectives["largest thrust squared"] == pytest.approx(1.0, rel=1e-5)
     assert trade_offs(point).rate("largest thrust squared", "time") == pytest.approx(-64 / 2.0**5, rel=1e-4)
@@ -259,11 +260,6 @@ def test_a_peak_that_need_not_count_is_held_too(c):
     found = trade_offs(as_front(nlp, nlp.tighten(vector(nlp, u=c)[None])[0])[0])
     by_u = np.array([4 * c, 4 * (2 * c - 1), 2.0])
     assert found.matrix == pytest.approx(by_u / by_u[:, None], rel=1e-6)
-
-
-def limited(time: float) -> dict[str, np.ndarray]:
-    """The least of a second objective where the first is at most so much."""
-    return {"reference": np.array([time, 0.0]), "weights": np.array([0.0, 1.0])}
 
 
 def test_controls_that_switch_at_moving_edges():

@@ -134,24 +134,22 @@ def test_the_welded_beam_is_that_of_another_program():
     F, violations = compiled.evaluate(np.array([[0.244369, 6.21861, 8.29147, 0.244369]]))
     assert violations.max() < 2e-4
     lower, upper = (np.array([getattr(v, side) for v in compiled.variables]) for side in ("lower", "upper"))
+
+    def slack(x: np.ndarray) -> np.ndarray:
+        """Distances from the limits, scaled: positive inside."""
+        pairs = zip(compiled.rows(x[None])[1][0], compiled.limits or (), strict=True)
+        return np.array([(v - limit.lower if np.isinf(limit.upper) else limit.upper - v) / limit.scale for v, limit in pairs])
+
     least = minimize(
         lambda x: compiled.evaluate(x[None])[0][0, 0],
         [0.3, 6.0, 8.0, 0.3],
         method="SLSQP",
         bounds=list(zip(lower, upper, strict=True)),
-        constraints={"type": "ineq", "fun": lambda x: _slack(compiled, x)},
+        constraints={"type": "ineq", "fun": slack},
     )
     assert least.success and least.fun == pytest.approx(F[0, 0], rel=1e-3)
     assert least.x == pytest.approx([0.244369, 6.21861, 8.29147, 0.244369], rel=2e-3)
     assert compiled.evaluate(np.array([[1.0, 1.0, 10.0, 5.0]]))[0][0, 1] == pytest.approx(4.39e-4, rel=1e-3)  # stiffest: largest beam
-
-
-def _slack(compiled: CompiledVectorProblem, x: np.ndarray) -> np.ndarray:
-    """Distances from the limits, scaled: positive inside."""
-    bounded = compiled.rows(x[None])[1][0]
-    limits = compiled.limits or ()
-    sides = [value - limit.lower if np.isinf(limit.upper) else limit.upper - value for value, limit in zip(bounded, limits, strict=True)]
-    return np.array(sides) / [limit.scale for limit in limits]
 
 
 def test_the_front_of_the_truss_is_that_of_weighted_sums_found_by_gradients():

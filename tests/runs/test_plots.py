@@ -25,11 +25,6 @@ def lines(ax):
     return {line.get_label(): np.column_stack(line.get_data()) for line in ax.get_lines()}
 
 
-def words(figure):
-    own = [ax.get_legend() for ax in figure.axes if ax.get_legend()]
-    return [text.get_text() for one in (*own, *figure.legends) for text in one.get_texts()]
-
-
 def test_all_points_of_all_runs_and_the_truth(tmp_path):
     fronts = {"ours": [foreign(A, GOALS), foreign(B, GOALS), foreign(EMPTY, GOALS)], "theirs": [A - [0, 0.5]]}
     figure = front_figure(fronts, goals=GOALS, reference=TRUTH, marked=B)
@@ -63,7 +58,8 @@ def test_surfaces_are_staircases():
     assert np.all((steps == 0).any(axis=1)), "up or across, never both"
     assert second.get_title(loc="left") == "theirs, 1 run" and second.get_xlim() == first.get_xlim()
     empty = attainment_figure({"ours": attainment([foreign(A, GOALS), foreign(EMPTY, GOALS)])}, goals=GOALS, reference=TRUTH)
-    assert "worst: not attained" in words(empty)
+    legends = (*(ax.get_legend() for ax in empty.axes if ax.get_legend()), *empty.legends)
+    assert "worst: not attained" in [text.get_text() for one in legends for text in one.get_texts()]
 
 
 @pytest.mark.parametrize("log", [True, False])

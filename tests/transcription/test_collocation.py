@@ -25,11 +25,6 @@ def tables(points: str, degree: int):
     return collocation_tables(points, degree, control_degree(points, degree), False)
 
 
-def exactness(points: str, degree: int) -> int:
-    """The highest degree that the quadrature integrates."""
-    return {"gauss": 2 * degree - 1, "radau": 2 * degree - 2, "lobatto": 2 * degree - 1, "chebyshev": degree + 1 - degree % 2}[points]
-
-
 @pytest.mark.parametrize("degree", [1, 2, 3, 5, 8, 40, 60])
 def test_points_are_roots_and_weights_the_closed_forms(degree):
     n = degree + 1
@@ -55,7 +50,8 @@ def test_points_are_roots_and_weights_the_closed_forms(degree):
 @pytest.mark.parametrize("degree", [1, 2, 3, 5, 8])
 @pytest.mark.parametrize("points", POINTS)
 def test_quadratures_are_as_exact_as_they_should_be_and_no_more(points, degree):
-    table, highest = tables(points, degree), exactness(points, degree)
+    table = tables(points, degree)
+    highest = {"gauss": 2 * degree - 1, "radau": 2 * degree - 2, "lobatto": 2 * degree - 1, "chebyshev": degree + 1 - degree % 2}[points]
     for power in range(highest + 2):
         exact = (1 - (-1) ** (power + 1)) / (power + 1)
         error = abs(table.weights @ table.tau**power - exact)
@@ -103,7 +99,8 @@ def test_it_is_the_differential_form_of_the_literature_with_its_covector_mapping
     table, D, rng = tables(points, degree), differential(points, degree), np.random.default_rng(1)
     left, right, X, rates = rng.normal(), rng.normal(), rng.normal(size=table.coefficients), rng.normal(size=len(table.tau))
     multipliers = rng.normal(size=table.rows)
-    costates = dict(zip(np.round(table_places(table), 12), table.costates @ multipliers, strict=True))
+    told = nodes(table.costate_basis, len(table.costates) - 1)
+    costates = dict(zip(np.round(told, 12), table.costates @ multipliers, strict=True))
     at_points = np.array([costates[round(tau, 12)] for tau in table.tau])
     ours = multipliers @ (np.array([left, *X, right]) @ table.balance + rates @ table.test)
     if points == "radau":
@@ -116,11 +113,6 @@ def test_it_is_the_differential_form_of_the_literature_with_its_covector_mapping
         assert costates[-1.0] == pytest.approx(at_end - D[:, 0] @ mapped, abs=1e-9), "that of the beginning"
     assert ours == pytest.approx(theirs, abs=1e-10)
     assert costates[1.0] == pytest.approx(at_end, abs=1e-10)
-
-
-def table_places(table) -> np.ndarray:
-    """Where the costates of a table are told."""
-    return nodes(table.costate_basis, len(table.costates) - 1)
 
 
 ORDERS = [

@@ -109,10 +109,9 @@ def test_derivatives_that_are_no_numbers_stop_no_search(broken):
 
 SMALLEST = DFET(1, 0)
 """One coefficient of each control."""
-SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
 
 
-def plane(limits: Callable[[Any, Any], list[tuple[Any, dict[str, float]]]], bounds: Any = SQUARE) -> NLP:
+def plane(limits: Callable[[Any, Any], list[tuple[Any, dict[str, float]]]], bounds: Any = ((-2.0, 2.0), (-2.0, 2.0))) -> NLP:
     """Two parameters p and q within bounds, and limits of expressions of them."""
     problem = still("plane")
     p, q = (problem.parameter(name, bounds=one) for name, one in zip("pq", bounds, strict=True))
@@ -170,18 +169,12 @@ def test_an_inequality_stands_where_the_circle_alone_would_be_nearer() -> None:
     assert set(found.status) == {"converged"}
 
 
-def edge() -> NLP:
-    """Three half-planes, of which steps that guess what is active go round in circles: the nearest point to (1, 0) is (0, 1/2)."""
-    return plane(
-        lambda p, q: [(q - 2 * p, {"lower": -1.0}), (-2 * p - q, {"lower": -0.5}), (3 * p + 3 * q, {"lower": 1.5})],
-        ((0.0, 1.0), (0.0, 1.0)),
-    )
-
-
 def test_steps_are_found_exactly_as_often_as_is_allowed() -> None:
-    statuses = {}
+    """On three half-planes, of which steps that guess what is active go round in circles: the nearest point to (1, 0) is (0, 1/2)."""
+    sides = lambda p, q: [(q - 2 * p, {"lower": -1.0}), (-2 * p - q, {"lower": -0.5}), (3 * p + 3 * q, {"lower": 1.5})]  # noqa: E731
+    statuses, nlp = {}, plane(sides, ((0.0, 1.0), (0.0, 1.0)))
     for exact in (0, 1, 1000):
-        x, found = solve(edge(), [[1.0, 0.0]], exact=exact)
+        x, found = solve(nlp, [[1.0, 0.0]], exact=exact)
         statuses[exact] = found.status[0]
     assert statuses == {0: "infeasible", 1: "infeasible", 1000: "converged"}
     assert x == pytest.approx(np.array([[0.0, 0.5]]), abs=1e-9)
@@ -239,16 +232,12 @@ def test_feasible_is_what_is_within_the_tolerance(tolerance: float) -> None:
     assert found.moved[0] < 1e-15 < 0.4 * tolerance < found.moved[1]
 
 
-def test_what_is_not_done_when_the_work_ends_says_so() -> None:
+def test_what_is_not_done_when_the_work_ends_says_so_and_work_is_counted_by_steps() -> None:
     nlp = circle(1.0)
     with stopped_by(lambda: True):
         x, found = solve(nlp, [[1.0, 0.0], [1.5, 0.5], [0.0, -1.0]])
     assert found.status.tolist() == ["converged", "timeout", "converged"]
     assert x == pytest.approx(np.array([[1.0, 0.0], [1.5, 0.5], [0.0, -1.0]])) and found.iterations.tolist() == [1, 1, 1]
-
-
-def test_its_work_is_counted_by_steps() -> None:
-    nlp = circle(1.0)
     for C, iterations in (([[1.0, 0.0]], 1), ([[1.0, 0.0]] * 3, 3), ([[1.5, 0.5]], 5)):
         found = Newton().solve(nlp, np.array(C))
         assert found.iterations.sum() == pytest.approx(iterations, abs=1 if iterations > 3 else 0)
@@ -267,20 +256,14 @@ def test_overflow_and_slopes_that_are_no_numbers_show_in_the_results_and_warn_no
     assert other.status.tolist() == ["infeasible", "converged", "converged"] and x[0].tolist() == [0.0, 0.0]
 
 
-def steps(anderson: Anderson, x: np.ndarray, s: Callable[[np.ndarray], np.ndarray], count: int) -> list[np.ndarray]:
-    """The points (k, d) of so many accelerated iterations."""
-    points = [x]
-    for _ in range(count):
-        points.append(points[-1] + anderson.improve(points[-1], s(points[-1]), np.ones(len(x), dtype=bool)))
-    return points
-
-
 @pytest.mark.parametrize("size", [1e-8, 1.0, 1e8])
 @pytest.mark.parametrize("d", [1, 2, 4])
 def test_linear_iterations_end_once_all_directions_are_known(d: int, size: float) -> None:
     rng = np.random.default_rng(d)
     A, root = -np.eye(d) + 0.5 * rng.standard_normal((d, d)), size * rng.standard_normal((3, d))
-    points = steps(Anderson(3, d, d), root + size * rng.standard_normal((3, d)), lambda x: (x - root) @ A.T, d + 3)
+    anderson, points = Anderson(3, d, d), [root + size * rng.standard_normal((3, d))]
+    for _ in range(d + 3):
+        points.append(points[-1] + anderson.improve(points[-1], (points[-1] - root) @ A.T, np.ones(3, dtype=bool)))
     plain = points[0] + (points[0] - root) @ A.T
     assert points[1] == pytest.approx(plain, rel=1e-12), "the first step is the plain one"
     assert np.abs(points[d] - root).max() > 1e-3 * size

@@ -37,12 +37,6 @@ def sampled(edges, coefficients):
     return places, np.array([bernstein_matrix(len(row) - 1, TAU) @ np.array(row, dtype=float) for row in coefficients])
 
 
-def smeared(before, after, share):
-    """Coefficients of a cubic from one bound to the other, as a coarse mesh shows a switch after `share` of an element."""
-    inner = 4.0 * (before * share + after * (1.0 - share)) - before - after
-    return [before, *np.clip([0.5 * inner, 0.5 * inner], 0.0, 1.0), after]
-
-
 def described(found):
     return [(one.before, one.after) for one in found]
 
@@ -62,7 +56,9 @@ def bang_bang(draw):
         if share is None:
             rows.append([float(value)] * 4)
         else:
-            rows.append(smeared(float(value), float(1 - value), share))
+            # A cubic from one bound to the other, as a coarse mesh shows a switch after `share` of an element.
+            inner = np.clip(2.0 * (value * share + (1 - value) * (1.0 - share)) - 0.5, 0.0, 1.0)
+            rows.append([float(value), inner, inner, float(1 - value)])
             places.append(edges[j] + share * (edges[j + 1] - edges[j]))
             value = 1 - value
     return edges, rows, places

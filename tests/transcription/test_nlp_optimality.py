@@ -211,7 +211,7 @@ def test_what_is_far_from_a_limit_has_no_multiplier() -> None:
         assert optimality(nlp, z, np.array([1.0])) == pytest.approx(4 * 10)
 
 
-def test_weights_of_two_objectives() -> None:
+def test_weights_of_two_objectives_and_what_the_best_of_a_mixture_leave() -> None:
     nlp = nlp_of(two_wells(q=(0.5, 2.0)), SMALLEST)
     for p in (0.0, 0.2, 0.9):
         multipliers = check(nlp, vector(nlp, p=p, q=0.5), np.array([1.0, 1.0]))
@@ -220,10 +220,6 @@ def test_weights_of_two_objectives() -> None:
     # In other scales it is the ratio that stays.
     multipliers = check(nlp, vector(nlp, p=0.2, q=0.5), np.array([0.5, 8.0]))
     assert multipliers.of_objectives[1] / multipliers.of_objectives[0] == pytest.approx(0.2 / 0.8, rel=1e-5)
-
-
-def test_a_mixture_has_what_its_best_weights_leave() -> None:
-    nlp = nlp_of(two_wells(q=(0.5, 2.0)), SMALLEST)
     s = 0.003 / 1.5
     z = vector(nlp, p=0.3, q=0.503)
     conditions = Conditions.of(nlp, z, np.ones(2))

@@ -41,16 +41,12 @@ def feasible(nlp: NLP, seed: int) -> np.ndarray:
     return found.z[0]
 
 
-def middle(nlp: NLP) -> np.ndarray:
-    return nlp.propagate(nlp.first_guess(0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])[None]))[0]
-
-
 def close(solved: Solved, F: object, miss: float) -> bool:
     return bool(np.allclose(solved.F, F, rtol=0, atol=miss))
 
 
 def solve(nlp: NLP, reference: list[float], weights: list[float], start: np.ndarray | None = None, **more: object) -> Solved:
-    first = middle(nlp) if start is None else start
+    first = nlp.propagate(nlp.first_guess(0.5 * (nlp.lower + nlp.upper)[nlp.free][None]))[0] if start is None else start
     return scalarize(nlp, first, reference=np.array(reference), weights=np.array(weights), **more)  # type: ignore[arg-type]
 
 

@@ -236,11 +236,6 @@ EDGES = (0.0, 0.1, 0.15, 0.4, 0.5, 0.9, 1.0)
 UNEVEN_KINDS = [("constant", None), ("linear", 10), ("spline", 4)]
 
 
-def image(places: np.ndarray, edges=EDGES) -> np.ndarray:
-    """Where places on equal intervals lie on those between edges."""
-    return np.interp(places, np.linspace(0, 1, len(edges)), edges)
-
-
 def on(edges=EDGES, **more) -> MultipleShooting:
     return MultipleShooting(3, mesh={"swing": (edges, TABLEAUX[more.get("scheme", "rk4")].order)}, **more)
 
@@ -261,7 +256,7 @@ def test_a_flight_is_what_scipy_makes_of_the_same_controls(kind, nodes):
     nlp = on(scheme="rk8", steps=4, control=kind, control_nodes=nodes).transcribe(oscillator())
     for z in propagated(nlp, 2):
         t0, tf, m = (z[slot(nlp, name)] for name in ("swing.t0", "swing.tf", "m"))
-        kinks = t0 + (tf - t0) * image(np.linspace(0, 1, nodes or len(EDGES)))
+        kinks = t0 + (tf - t0) * np.interp(np.linspace(0, 1, nodes or len(EDGES)), np.linspace(0, 1, len(EDGES)), EDGES)
         u, v = (law_at(kind, kinks, values_of(nlp, z, name)) for name in ("swing.u", "swing.v"))
         x, cost = np.array([z[slot(nlp, "swing.x(t0)")], 0.5]), 0.0
 

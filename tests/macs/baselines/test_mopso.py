@@ -181,16 +181,12 @@ def test_a_search_ends_when_the_mean_of_the_front_has_settled(tmp_path) -> None:
 
 
 def test_with_the_printed_sign_particles_move_away() -> None:
-    bounds = [(-4.0, 4.0)] * 4
-    found = {
-        printed: MOPSO(particles=20, printed=printed).minimize(sphere, bounds, evaluations=2000, seed=3).F for printed in (False, True)
-    }
+    def sphere(X: np.ndarray) -> np.ndarray:
+        """Squared distances from two points; the front is the line between them."""
+        return np.stack([((X - 1.0) ** 2).sum(axis=1), ((X + 1.0) ** 2).sum(axis=1)], axis=1)
+
+    found = {p: MOPSO(particles=20, printed=p).minimize(sphere, [(-4.0, 4.0)] * 4, evaluations=2000, seed=3).F for p in (False, True)}
     assert found[False].sum(axis=1).min() + 1.0 < found[True].sum(axis=1).min()
-
-
-def sphere(X: np.ndarray) -> np.ndarray:
-    """Squared distances from two points; the front is the line between them."""
-    return np.stack([((X - 1.0) ** 2).sum(axis=1), ((X + 1.0) ** 2).sum(axis=1)], axis=1)
 
 
 def srn(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

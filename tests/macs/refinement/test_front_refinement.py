@@ -19,10 +19,6 @@ from transcription.inner import Ipopt
 from transcription.nlp.scalarized import scalarize
 
 
-def front_of(problem, nlp, Z) -> Front:
-    return Front(**trajectory_columns(nlp, np.array(Z), 1e-6), goals=nlp.problem.goals, problem=nlp.problem)
-
-
 @pytest.fixture(scope="module")
 def coarse() -> Front:
     """Goddard on the paper's mesh: both ends and three points between them, as good as that mesh knows."""
@@ -33,7 +29,7 @@ def coarse() -> Front:
     Z = [scalarize(nlp, z, reference=np.array([0.0, np.inf]), weights=np.array([1.0, 0.0])).z]
     for tf in (112.0, 125.0, 170.0, 250.0):
         Z.append(scalarize(nlp, Z[-1], reference=np.array([tf, 0.0]), weights=np.array([0.0, 1.0])).z)
-    return front_of(problem, nlp, Z)
+    return Front(**trajectory_columns(nlp, np.array(Z), 1e-6), goals=problem.goals, problem=problem)
 
 
 @pytest.fixture(scope="module")

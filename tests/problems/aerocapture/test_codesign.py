@@ -16,13 +16,6 @@ from problems.cases.aerocapture.designs import BOUNDS, TABLE_2, assess, shapes_o
 from transcription import stated
 
 
-def expression() -> ca.Function:
-    """Base radius, length, lift and drag of the five variables, in radians."""
-    x = ca.MX.sym("x", 5)
-    shape = sized(*(x[i] for i in range(4)))
-    return ca.Function("capsule", [x], [ca.vertcat(shape.base, shape.length, *lift_and_drag(shape, x[4]))])
-
-
 def test_expressions_have_the_values_of_arrays_and_true_derivatives():
     X = np.random.default_rng(7).uniform(*np.array(BOUNDS).T, (60, 5))
     # With a part of the nose and of the front cone in the shadow, too, and where the shadow begins.
@@ -30,11 +23,13 @@ def test_expressions_have_the_values_of_arrays_and_true_derivatives():
     X[10, 2], X[10, 4] = 25.0, 25.0
     shapes, attack = shapes_of(X)
     X[:, 2:] = np.radians(X[:, 2:])
-    function = expression()
+    # Base radius, length, lift and drag of the five variables, in radians.
+    x = ca.MX.sym("x", 5)
+    shape = sized(*(x[i] for i in range(4)))
+    function = ca.Function("capsule", [x], [ca.vertcat(shape.base, shape.length, *lift_and_drag(shape, x[4]))])
     found = np.array(function(X.T)).T
     expected = np.column_stack([shapes.base, shapes.length, *lift_and_drag(shapes, attack)])
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
-    x = ca.MX.sym("x", 5)
     slopes = ca.Function("slopes", [x], [ca.jacobian(function(x), x)])
     curves = ca.Function("curves", [x], [ca.hessian(function(x)[2], x)[0]])
     for i, row in enumerate(X):
