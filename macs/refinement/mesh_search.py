@@ -79,14 +79,15 @@ def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
 
 
 def coarse_meshes(problem: Problem | CompiledProblem) -> list[Meshed]:
-    """Meshes to begin on, in their order: meshes fine enough for a guess, the problem's own, and coarse ones; with edges at the corners of
-    tables."""
+    """Meshes to begin on, in their order: meshes fine enough for a guess and for oscillations, the problem's own, and coarse ones; with edges
+    at the corners of tables."""
     own, compiled = default_transcription(problem), problem.compile()
     coarse = list(dict.fromkeys([own, *COARSE] if isinstance(own, Meshed) else COARSE))
-    elements = guessed_elements(compiled)
+    elements = max(guessed_elements(compiled), swinging_elements(compiled))
     if elements > coarse[0].elements:
         coarse = [DFET(elements, 3, basis="bernstein"), DFET(elements, 3), *coarse]
-    return [method.remeshed({phase.name: _cornered(method, phase) for phase in compiled.phases if phase.corners}) for method in coarse]
+    cornered = [phase for phase in compiled.phases if phase.corners]
+    return [method.remeshed({phase.name: _cornered(method, phase) for phase in cornered}) if cornered else method for method in coarse]
 
 
 def _cornered(method: Meshed, phase: CompiledPhase) -> PhaseMesh:
