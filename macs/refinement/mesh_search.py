@@ -79,7 +79,7 @@ def default_transcription(problem: Problem | CompiledProblem) -> Transcription:
 
 
 def coarse_meshes(problem: Problem | CompiledProblem) -> list[Meshed]:
-    """Meshes to begin on, in their order: meshes fine enough for a guess and for oscillations, the problem's own, and coarse ones; with edges
+    """Meshes to begin on, in order: fine enough for a guess and for oscillations, the problem's own, and coarse ones; edges are
     at the corners of tables."""
     own, compiled = default_transcription(problem), problem.compile()
     coarse = list(dict.fromkeys([own, *COARSE] if isinstance(own, Meshed) else COARSE))
