@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -195,14 +194,15 @@ class LexicographicEnd(Scalarised):
                 first = held
         if first.status != CONVERGED:
             return first
+        # No slack: where the front is steep, a small loss in one objective changes another by its square root.
         others = Scalarised(np.where(mine, np.inf, first.F), units, np.where(mine, first.F, np.inf))
         # The first solve does not look at the other objectives, and often leaves a start that was nearly the end.
         (F,), (violation,) = nlp.evaluate(start[None])
-        closer = [start] if violation <= END.close and bool((first.F >= F).all()) else []
+        closer = violation <= END.close and bool((first.F >= F).all())
         with solves.at_most(END.ties):
-            second = without_loss(partial(solves, nlp), solves.tolerance, first, others, END.slack * units, closer)
+            second = solves(nlp, start if closer else first.z, others, near)
         # What tells whether the one objective is at its least are the multipliers for that alone.
-        return replace(second, multipliers=first.multipliers)
+        return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
 
 
 MOST_ITERATIONS = 500
