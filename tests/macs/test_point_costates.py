@@ -87,7 +87,8 @@ def refined(name: str, **options):
 )
 def test_the_hamiltonian_is_constant_where_nothing_depends_on_time(name, value):
     """Minus the slope of the objective in the free final time: 1 where this is the objective, else 0. To 2e-5 of the unit of time, as the
-    twelve elements have it on which the time is right to 4e-8; a range of a kilometre is known to the 1e-7 of it to which the mesh was refined."""
+    twelve elements have it on which the time is right to 5e-8; a range of a kilometre is known to the 1e-7 of it to which the mesh was
+    refined."""
     point = refined(name, starts=1)
     (along,) = point.hamiltonian.values()
     assert along == pytest.approx(np.full(len(along), value), abs=max(2e-5, 1e-7 * abs(float(point.F[0]))))
