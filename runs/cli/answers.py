@@ -21,8 +21,6 @@ DONE, FAILED, WRONG, INTERRUPTED = 0, 1, 2, 130
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of a disk, for which the call is not to blame."""
-FORKED_SECONDS = 5
-"""Seconds that a process which a command has forked, such as a worker of the user's pool, lives on after SIGTERM."""
 CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 """Characters that a terminal obeys instead of showing them, but for ends of lines and tabulators."""
 
@@ -114,9 +112,9 @@ def ended_as_by_ctrl_c() -> Iterator[None]:
 
     def as_ctrl_c(number: int, frame: FrameType | None) -> None:
         handler = signal.getsignal(signal.SIGINT)
-        if os.getpid() != installed_in and hasattr(signal, "alarm"):  # forked: what it has in hand is finished, since others wait for it
+        if os.getpid() != installed_in and hasattr(signal, "alarm"):  # forked: five seconds for what others wait for
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
-            signal.alarm(FORKED_SECONDS)
+            signal.alarm(5)
         elif callable(handler) and os.getpid() == installed_in:
             handler(signal.SIGINT, frame)
         else:  # SIGTERM is to end a process in the background, too, which may ignore Ctrl-C
