@@ -91,13 +91,13 @@ HONEST: dict[str, Callable[[Function, np.random.Generator], Function]] = {
     "whole numbers": _with(lambda F, X: np.round(10 * F).astype(int)),
     "lists": _with(lambda F, X: F.tolist()),
     "changes its rows": lambda plain, rng: lambda X: plain(np.multiply(X, 0.5, out=X)),
-    "booleans": _with(lambda F, X: F > 0),
 }
 CARELESS: dict[str, Callable[[Function, np.random.Generator], Function]] = {
     "complex": _with(lambda F, X: F + 1j),
     "masked": _with(lambda F, X: np.ma.masked_greater(F, 0.5)),
     "wrong length": _with(lambda F, X: F[:-1]),
     "transposed": _with(lambda F, X: np.vstack([F, F]).T),
+    "booleans": _with(lambda F, X: F > 0),
     "words": _with(lambda F, X: [["a"] * F.shape[1]] * len(F)),
     "None": _with(lambda F, X: None),
     "a number": _with(lambda F, X: 1.0),

@@ -65,8 +65,9 @@ def test_only_points_that_are_feasible_when_simulated_count(folder):
             claims = Front.load(run.path, problem)
             simulated = claims.simulate(tolerance=0.01, rtol=1e-10, atol=1e-11)
             defects = np.array([point.simulate(rtol=1e-10, atol=1e-11).max_defect for point in claims])
-            off = np.abs(simulated.F - claims.F) / np.ptp(claims.F, axis=0)
             right = (np.max([defects, simulated.violation], axis=0) <= 0.01).nonzero()[0]
+            ends = claims.F[right][claims.F[right].argmin(axis=0)]
+            off = np.abs(simulated.F - claims.F) / np.ptp(ends, axis=0)
             fully = right[off[right].max(axis=1) <= 0.01]
             best = Front.merge([simulated[right]])
             np.testing.assert_allclose(front.F, best.F, rtol=1e-5)
