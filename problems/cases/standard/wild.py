@@ -1,4 +1,4 @@
-"""Problems as people state them who ask for help with them: each stands for a kind that a program of this sort gets wrong.
+"""Problems as users stated them when they asked for help: each stands for a kind that this program once solved wrongly.
 
 Their optima are closed forms, or were found by shooting from the structure that is known.
 """
