@@ -24,7 +24,7 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
-from ..gradients.scalarised import WEAK, WORK, GradientSolves, Scalarised, Start, best_of
+from ..gradients.scalarised import WORK, GradientSolves, Scalarised, Start, best_of
 from ..pareto.dominance import objective_units, stated_scales
 
 
@@ -80,7 +80,6 @@ class OnMesh:
     achieved: np.ndarray | None  # (m,): The objectives of its simulation, all minimised, where that is feasible
     doubt: float = 0.0  # by how much, in units, these may be too low, since constraints are not satisfied exactly
     change: float = np.inf  # largest change of an objective that matters from the mesh before, in units; infinite where there was none
-    remark: str = ""
     tried: bool = False  # whether elements were cut where other controls would gain, which changed next to nothing
 
     @property
@@ -141,8 +140,7 @@ class Refinement:
         if complaints:
             complaints.append(self.best.verdict.worst_place(self.best.method, self.best.trajectory))
             complaints += [self.trouble] if self.trouble else []
-        remarks = [self.best.verdict.remark if self.best.verdict.unstable else "", self.best.remark]
-        return "; ".join([*complaints, *filter(None, remarks)])
+        return "; ".join([*complaints, *([self.best.verdict.remark] if self.best.verdict.unstable else [])])
 
 
 @dataclass(eq=False)
@@ -314,7 +312,7 @@ class MeshLoop:
         # On the same mesh nothing can be seen of what that has wrong.
         change = np.inf if method == present.method else _change(present, F, task, self.wanted.settled)
         tried = present.gaining and change <= LOOP.hollow * present.verdict.gain
-        return replace(reached, change=change, tried=tried, remark=WEAK if solved.message == WEAK else ""), solved.status
+        return replace(reached, change=change, tried=tried), solved.status
 
     def _from_starts(
         self, nlp: NLP, present: OnMesh, task: Scalarised, others: Sequence[Trajectory], least: float, near_first: bool
