@@ -37,10 +37,10 @@ class EndsLimits:
 ENDS = EndsLimits()
 
 
-def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved] | None = None) -> list[Solved]:
+def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved] | None = None, most: float = np.inf) -> list[Solved]:
     """The lexicographic optimum of each objective, from its optimum alone, `single(i)`, and from the ends of the others, which may lie in
     other valleys: its least value, then those of the others in their order, without a loss in those before, or one of
-    `EndLimits.slack`."""
+    `EndLimits.slack`; after the optima of single objectives, with at `most` so much work."""
     m = len(solver.nlp.problem.goals)
     optima, tried = list[Solved](), dict[tuple[int, int], np.ndarray]()
     for i in range(m):
@@ -48,14 +48,15 @@ def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved]
         optima.append((single or solver.single)(i))
         tried |= {(i, k): optima[k].F for k in range(i) if begun is not None and np.array_equal(begun, optima[k].z)}
     ends: list[Solved | None] = [None] * m
-    for _ in range(ENDS.rounds):
-        _from_each_other(solver, optima, tried)
-        for i in range(m):
-            if optima[i] is not ends[i]:
-                ends[i] = _lexicographic(solver, i, optima)
-        if all(one is end for one, end in zip(optima, ends, strict=True)):
-            break
-        optima = [end for end in ends if end is not None]
+    with solver.solves.within(most):
+        for _ in range(ENDS.rounds):
+            _from_each_other(solver, optima, tried)
+            for i in range(m):
+                if optima[i] is not ends[i]:
+                    ends[i] = _lexicographic(solver, i, optima)
+            if all(one is end for one, end in zip(optima, ends, strict=True)):
+                break
+            optima = [end for end in ends if end is not None]
     return optima
 
 

@@ -24,6 +24,7 @@ class PolishLimits:
     # An end may be replaced by a point that is worse in another objective by more than `loss` if it gains more than `fair` in its own.
     fair: float = 1e-4
     loss: float = 0.05
+    fruitless: int = 8  # solves from neighbours in a row that find nothing better, after which no more are made
     rounds: int = 6  # most rounds with starts from neighbours, and most rounds in which points slide along the front
     wide: float = 1.5  # a gap so many times as wide as the median one gets a point of its own; crowded points are left out for it
     nearer: float = 0.15  # where the middle of a gap was not reached, places are tried at this part of the way from both sides
@@ -156,28 +157,30 @@ def _ends(archive: Archive, span: np.ndarray, solves: BudgetedSolves, solved: np
 
 
 def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.ndarray | None = None) -> Archive:
-    """The archive after guarded solves of all, or the chosen, points from their neighbours, except those that failed before; the archive
-    itself if none improves or too few solves are left."""
+    """The archive after guarded solves of all, or the chosen, points from their neighbours, the most promising first, until some in a row
+    find nothing better; not those that failed before. The archive itself if none improves."""
     span, m = ranges(archive.F), archive.F.shape[1]
     rows = range(len(archive)) if chosen is None else np.unique(chosen).tolist()
-    pairs = [(i, j) for i in rows for j in nearest(archive.F[i], archive.F, span)[1 : m + 1]]
-    if len(pairs) > solves.left and m > CURVE:
-        # What another point nearly dominates most likely lies in a poorer valley.
-        worse = ((archive.F[None] - archive.F[:, None]) / span).max(axis=2)
-        np.fill_diagonal(worse, np.inf)
-        pairs = [(i, int(worse[i].argmin())) for i in sorted(rows, key=lambda i: worse[i].min())[: solves.left // 2]]
+    # What another point nearly dominates most likely lies in a poorer valley.
+    worse = ((archive.F[None] - archive.F[:, None]) / span).max(axis=2)
+    pairs = sorted(((i, j) for i in rows for j in nearest(archive.F[i], archive.F, span)[1 : m + 1]), key=lambda pair: worse[pair])
     known = solves.failed_pairs if solves.failed_pairs is not None else np.empty((0, 2 * m))
-    pairs = [(i, j) for i, j in pairs if not among(np.hstack([archive.F[[i]], archive.F[[j]]]), known)[0]]
-    if not 0 < len(pairs) <= solves.left:
-        return archive
-    own, other = (np.array(index) for index in zip(*pairs, strict=True))
-    found = solves(archive.Z[other], archive.F[own], np.tile(span, (len(own), 1)))
-    gain = ((archive.F[own] - found.F) / span).min(axis=1)
-    better = (found.status == CONVERGED) & (gain > BETTER)
-    solves.failed_pairs = np.vstack([known, np.hstack([archive.F[own], archive.F[other]])[~better]])
-    if not better.any():
-        return archive
-    return _front(Archive.of(found, better).joined(archive), span)
+    both = [np.hstack([archive.F[i], archive.F[j]]) for i, j in pairs]
+    left, better, failed, fruitless = solves.left // (2 if len(pairs) > solves.left else 1), archive.take(np.arange(0)), [known], 0
+    for (i, j), pair in zip(pairs, both, strict=True):
+        if among(pair[None], known)[0]:
+            continue
+        if not left or fruitless == POLISH.fruitless:
+            break
+        found = solves(archive.Z[[j]], archive.F[[i]], span[None])
+        gained = found.status[0] == CONVERGED and ((archive.F[i] - found.F[0]) / span).min() > BETTER
+        left, fruitless = left - 1, 0 if gained else fruitless + 1
+        if gained:
+            better = Archive.of(found, np.ones(1, dtype=bool)).joined(better)
+        else:
+            failed.append(pair[None])
+    solves.failed_pairs = np.vstack(failed)
+    return _front(better.joined(archive), span) if len(better) else archive
 
 
 def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -328,12 +331,21 @@ class PolishLog:
 
 
 class BudgetedSolves:
-    """Gradient solves up to a number; after a request to end early no more are made. `failed_pairs` (k, 2 m) has the objectives of points
-    and of the neighbours from which nothing better was found for them."""
+    """Gradient solves up to a number, and, after the `least` number of them, up to the most work of the whole search; after a request to
+    end early no more are made. `failed_pairs` (k, 2 m) has the objectives of points and of the neighbours from which nothing better was
+    found for them."""
 
-    def __init__(self, evaluator: Evaluator, left: int, log: PolishLog | None = None, failed_pairs: np.ndarray | None = None) -> None:
-        self._evaluator, self._log = evaluator, log
-        self._made = 0
+    def __init__(
+        self,
+        evaluator: Evaluator,
+        left: int,
+        log: PolishLog | None = None,
+        failed_pairs: np.ndarray | None = None,
+        least: int = 0,
+        most_work: float = np.inf,
+    ) -> None:
+        self._evaluator, self._log, self._least, self._most_work = evaluator, log, least, most_work
+        self._made, self._answers = 0, dict[bytes, Evaluation]()
         self.left, self.stopped, self.failed_pairs = left, False, failed_pairs
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
@@ -342,17 +354,30 @@ class BudgetedSolves:
         violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
         for row in range(max(min(len(starts), self.left), 0)):
             one = slice(row, row + 1)
-            found = self._solve(starts[one], references[one], weights[one])
-            if not len(found.F):
-                self.left, self.stopped = 0, True
-                break
-            self.left -= 1
+            task = starts[one], references[one], weights[one]
+            same = b"".join(part.tobytes() for part in task)
+            if same not in self._answers:
+                if self._worked_enough:
+                    self.left = 0
+                    break
+                found = self._solve(*task)
+                if not len(found.F):
+                    self.left, self.stopped = 0, True
+                    break
+                self.left, self._answers[same] = self.left - 1, found
+            found = self._answers[same]
             Z[one], F[one], violation[one], status[one] = found.Z, found.F, found.violation, found.status
         return Evaluation(Z, F, violation, status)
 
     def feasible(self, found: Evaluation) -> np.ndarray:
         """Mask (k,) of the feasible results, which may include solves that ran out of iterations."""
         return (found.status == CONVERGED) | (found.violation <= self._evaluator.tolerance)
+
+    @property
+    def _worked_enough(self) -> bool:
+        """Whether no further solve is to be made, whatever their number; those in the log are."""
+        known = 0 if self._log is None else len(self._log)
+        return self._made >= max(self._least, known) and self._evaluator.counts.work >= self._most_work
 
     def _solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> Evaluation:
         """The result of the next solve, one row, from the log or made now; no row if asked to end early."""

@@ -11,10 +11,10 @@ import numpy as np
 
 from transcription.base import NLP
 from transcription.nlp.elastic import least_violation
-from transcription.nlp.scalarized import Solved, scalarize
+from transcription.nlp.scalarized import Solved, not_begun, scalarize
 from transcription.stopping import stopping
 
-from ..evaluation.evaluator import CONVERGED, Counts
+from ..evaluation.evaluator import CONVERGED, FAILED, Counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +215,9 @@ class WorkLimits:
 
     building: float = 30.0  # iterations that take as long as it takes to make a program with its derivatives: measured 18 to 53
     little: float = 6e5  # what other starts may always take together: a second or two
+    # After which no round of a search begins, and no polish goes on but for ends and one solve for each point: half a minute, more for
+    # large programs.
+    search: float = 3e6
     most: float = 1.5e6  # after which no mesh of an optimum is begun, once one is found: some half a minute, more for large programs
 
 
@@ -232,6 +235,8 @@ class GradientSolves:
     def __call__(self, nlp: NLP, start: np.ndarray, task: Scalarised, near: bool = False, held: Sequence[int] | np.ndarray = ()) -> Solved:
         """The result of one solve from a vector (n,), or near it only, where some variables keep their values; see `scalarize`."""
         self.before()
+        if self._most_work <= self.counts.work:
+            return replace(not_begun(nlp, start), status=FAILED, clocked=False)
         iterations = max(1, int(min(self.max_iterations, (self._most_work - self.counts.work) / len(nlp.variables))))
         persistent = self._persistent and iterations == self.max_iterations
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": iterations, "persistent": persistent}
@@ -250,11 +255,11 @@ class GradientSolves:
     @contextmanager
     def within(self, work: float) -> Iterator[None]:
         """Context in which solves end when together they have taken so much work."""
-        self._most_work = self.counts.work + work
+        usual, self._most_work = self._most_work, self.counts.work + work
         try:
             yield
         finally:
-            self._most_work = np.inf
+            self._most_work = usual
 
     @contextmanager
     def at_most(self, iterations: int) -> Iterator[None]:

@@ -43,6 +43,7 @@ class MendingLimits:
     each: float = 100.0  # iterations for each point that is missed that are allowed even then: enough for one more mesh
     # Work that is always allowed, about a second, since a mesh that is coarse for its search is refined to many times its variables.
     least: float = 2e5
+    blurred: float = 5.0  # tolerances by which objectives may be off that are rather taken from the simulation than found on another mesh
     slightly: float = 0.1  # excess over limits, in their scales, up to which a point is rather moved inside of them
     loss: float = 5e-3  # what that may cost in each objective, in ranges of the front
     starts: int = 2  # verified points from which a solve for a further one is tried
@@ -132,7 +133,8 @@ class _Mending:
             again = self.points = self.marked(again)
         tried = again
         if fine is None:
-            again = tried = self._inside(again, _slightly_outside(again, self.verify), MENDING.loss)
+            # What costs least comes first: the mesh and its program are there.
+            again = tried = self._as_simulated(self._inside(again, _slightly_outside(again, self.verify), MENDING.loss), MENDING.blurred)
         again = self._refined(again, self._meshed(again, again.was_simulated & ((fine is not None) | ~again.verified)), fine)
         # On a finer mesh, too, a point may exceed limits between nodes, and by less.
         moved = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
@@ -141,13 +143,13 @@ class _Mending:
         again = self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
         return self._as_simulated(self.marked(again.replace(tolerances=None)) if self._later and again is not self.points else again)
 
-    def _as_simulated(self, points: Points) -> Points:
-        """The points, with simulated objectives in place of those that are wrong where nothing else is: quadrature over a kink."""
-        rows = feasible_as_simulated(points, self.verify) & ~points.verified & ~untrusted(points)
+    def _as_simulated(self, points: Points, most: float = np.inf) -> Points:
+        """The points, with simulated objectives in place of those that are wrong, by at `most` so many tolerances, where nothing else is:
+        quadrature over a kink."""
+        rows = feasible_as_simulated(points, self.verify) & ~points.verified & ~untrusted(points) & (missed(points).max(axis=1) <= most)
         if not rows.any():
             return points
-        said = zip(points.notes, np.where(rows, AS_SIMULATED, "").tolist(), strict=True)
-        notes = ["; ".join(filter(None, words)) for words in said]
+        notes = np.where(rows, AS_SIMULATED, points.notes).tolist()
         return self.marked(points.replace(F=np.where(rows[:, None], points.simulated_F, points.F), notes=notes))
 
     @_unless_stopped
@@ -173,7 +175,8 @@ class _Mending:
         the nearest verified points, on their meshes, to where unverified ones are, then to the middles of the widest gaps."""
         if not differentiable(self.programs.problem):
             return points
-        most, tried = self._most_work(points, size - int(points.verified.sum())), np.empty((0, points.F.shape[1]))
+        most = self._solves.counts.work + self._most_work(points, size - int(points.verified.sum()))
+        tried = np.empty((0, points.F.shape[1]))
         while points.verified.any() and _needed(points).sum() < size and self._solves.counts.work < most and not stopping():
             scales = objective_scales(points)
             target = _target(points, tried, scales, guide)
@@ -199,8 +202,8 @@ class _Mending:
         solved = task.solve(self._solves, nlp, points[row].decision)
         if solved.status != CONVERGED:
             return None
-        found = from_vectors(nlp, solved.z[None], points.solver, points.stats)
-        found = verified(found, self.verify, task.weights, remark=False, simulations=self.simulations)
+        found = self.marked(from_vectors(nlp, solved.z[None], points.solver, points.stats, **_judged(points[[row]])))
+        found = self._as_simulated(self._inside(found, _slightly_outside(found, self.verify)), MENDING.blurred)
         return found if found.verified[0] else None
 
     @_unless_stopped
@@ -209,10 +212,11 @@ class _Mending:
         weight on every objective, the objectives without are minimised once. `points` itself if none is better."""
         m, scales, better = points.F.shape[1], objective_scales(points), dict[int, Points]()
         best = extremes(points.F) if len(points) else np.zeros(0)
+        most = self._solves.counts.work + self._most_work(points, 0)
         for i in self._meshed(points, points.verified) if m > 1 and differentiable(self.programs.problem) else ():
             own = points[i].weights
             weights = (best == i).astype(float) if own is None else np.array(list(own.values()))
-            if not (weights > 0).any() or stopping():
+            if not (weights > 0).any() or self._solves.counts.work >= most or stopping():
                 continue
             nlp = self.programs(from_dict(points[i].transcription or {}))
             point = Solved(points[i].decision, points[i].F, points[i].violation, CONVERGED, 0)
@@ -273,10 +277,10 @@ class _Mending:
 
 
 def _slightly_outside(points: Points, verify: float) -> list[int]:
-    """The points whose only fault in a simulation is that they exceed limits a little, mostly between nodes. A solve on their own mesh,
-    whose program exists already, costs far less than on any other."""
+    """The points whose only faults in a simulation are that they exceed limits a little, mostly between nodes, and that objectives are a
+    little off. A solve on their own mesh, whose program exists already, costs far less than on any other."""
     beyond = (points.simulated_violation > verify) & (points.simulated_violation <= MENDING.slightly) & (points.status == CONVERGED)
-    return np.flatnonzero(beyond & (points.defect <= verify) & (missed(points) <= 1.0).all(axis=1)).tolist()
+    return np.flatnonzero(beyond & (points.defect <= verify) & (missed(points) <= MENDING.blurred).all(axis=1)).tolist()
 
 
 def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: float = np.inf) -> Points:

@@ -20,7 +20,7 @@ from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_between
 from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
-from ..gradients.scalarised import GradientSolves, Scalarised
+from ..gradients.scalarised import WORK, GradientSolves, Scalarised
 from ..pareto.archive import Archive
 from ..pareto.dominance import CURVE, extremes, feasible_and_no_worse, nearest, ranges
 from ..pareto.spread import Guide
@@ -119,7 +119,7 @@ class Opening:
     def _solved(self, solver: MultistartSolver) -> Evaluation:
         """The ends of the front and a compromise between them; where the search chooses its inner solvers, points along the front instead,
         each by multistart. Fewer if asked to end early, or if solves fail."""
-        found = lexicographic_ends(solver)
+        found = lexicographic_ends(solver, most=WORK.most)  # the polish improves ends, too
         self.multimodal = any(one.optima() > 1 for one in solver.stopping.values())
         for i, one in solver.stopping.items():
             self.unimodal[i] = one.enough and one.optima() == 1
@@ -204,7 +204,9 @@ def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator,
         count = max(state.evaluations // settings.polish_every - memory.solves, least)
     else:
         count = GRADIENT_RULES.polish_per_point * settings.archive
-    solves = BudgetedSolves(evaluator, count, log, memory.failed_pairs)
+    # Ends and one solve for each point are always made.
+    limits = (0, np.inf) if rounds is None else (settings.archive + 2 * state.archive.F.shape[1], WORK.search)
+    solves = BudgetedSolves(evaluator, count, log, memory.failed_pairs, *limits)
     # A later round is polished if it found something new: not all starts are alike.
     unimodal = bool(memory.unimodal.all()) and memory.polished is None
     exponent = settings.variant.energy_exponent

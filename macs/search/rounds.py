@@ -110,7 +110,7 @@ def next_round(
     fruitless = evaluations - rounds.improved
     if fruitless >= patience and (not multimodal or work - rounds.work >= little or fruitless >= ROUND_LIMITS.long * shortest):
         return replace(rounds, stopped=DONE)
-    if evaluations >= ceiling:
+    if evaluations >= ceiling or (len(rounds.front) and work >= WORK.search):
         return replace(rounds, stopped=CEILING)
     end = min(evaluations + max(shortest, evaluations // ROUND_LIMITS.growth), ceiling)
     return replace(rounds, end=end, due=rounds.due + (end - evaluations) // ROUND_LIMITS.restart)

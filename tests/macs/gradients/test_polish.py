@@ -307,7 +307,7 @@ def test_what_is_no_better_than_an_optimum_gives_way_to_it() -> None:
 class Answers:
     """Gives prepared objectives, and notes from where they were asked."""
 
-    tolerance = 1e-6
+    tolerance, counts = 1e-6, Counts()
 
     def __init__(self, *F: list[float]) -> None:
         self.F, self.starts = iter(np.array(F)), []
