@@ -24,7 +24,6 @@ class PolishLimits:
     # An end may be replaced by a point that is worse in another objective by more than `loss` if it gains more than `fair` in its own.
     fair: float = 1e-4
     loss: float = 0.05
-    fruitless: int = 8  # solves from neighbours in a row that find nothing better, after which no more are made
     rounds: int = 6  # most rounds with starts from neighbours, and most rounds in which points slide along the front
     wide: float = 1.5  # a gap so many times as wide as the median one gets a point of its own; crowded points are left out for it
     nearer: float = 0.15  # where the middle of a gap was not reached, places are tried at this part of the way from both sides
@@ -157,8 +156,8 @@ def _ends(archive: Archive, span: np.ndarray, solves: BudgetedSolves, solved: np
 
 
 def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.ndarray | None = None) -> Archive:
-    """The archive after guarded solves of all, or the chosen, points from their neighbours, the most promising first, until some in a row
-    find nothing better; not those that failed before. The archive itself if none improves."""
+    """The archive after guarded solves of all, or the chosen, points from their neighbours, the most promising first, until as many in
+    a row as there are points find nothing better; not those that failed before. The archive itself if none improves."""
     span, m = ranges(archive.F), archive.F.shape[1]
     rows = range(len(archive)) if chosen is None else np.unique(chosen).tolist()
     # What another point nearly dominates most likely lies in a poorer valley.
@@ -170,7 +169,7 @@ def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.n
     for (i, j), pair in zip(pairs, both, strict=True):
         if among(pair[None], known)[0]:
             continue
-        if not left or fruitless == POLISH.fruitless:
+        if not left or fruitless == len(archive):
             break
         found = solves(archive.Z[[j]], archive.F[[i]], span[None])
         gained = found.status[0] == CONVERGED and ((archive.F[i] - found.F[0]) / span).min() > BETTER

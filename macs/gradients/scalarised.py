@@ -215,10 +215,12 @@ class WorkLimits:
 
     building: float = 30.0  # iterations that take as long as it takes to make a program with its derivatives: measured 18 to 53
     little: float = 6e5  # what other starts may always take together: a second or two
-    # After which no round of a search begins, and no polish goes on but for ends and one solve for each point: half a minute, more for
-    # large programs.
-    search: float = 3e6
     most: float = 1.5e6  # after which no mesh of an optimum is begun, once one is found: some half a minute, more for large programs
+
+    @property
+    def search(self) -> float:
+        """After which no round of a search begins, and no polish goes on but for ends and one solve for each point."""
+        return 2 * self.most
 
 
 WORK = WorkLimits()

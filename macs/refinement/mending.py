@@ -30,6 +30,7 @@ from ..pareto.dominance import extremes, separate
 from ..pareto.spread import Guide, spread
 from .front_refinement import FrontRefinement
 from .mesh_loop import OnMesh, Programs, differentiable
+from .mesh_search import SEARCH
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,6 @@ class MendingLimits:
     each: float = 100.0  # iterations for each point that is missed that are allowed even then: enough for one more mesh
     # Work that is always allowed, about a second, since a mesh that is coarse for its search is refined to many times its variables.
     least: float = 2e5
-    blurred: float = 5.0  # tolerances by which objectives may be off that are rather taken from the simulation than found on another mesh
     slightly: float = 0.1  # excess over limits, in their scales, up to which a point is rather moved inside of them
     loss: float = 5e-3  # what that may cost in each objective, in ranges of the front
     starts: int = 2  # verified points from which a solve for a further one is tried
@@ -134,7 +134,7 @@ class _Mending:
         tried = again
         if fine is None:
             # What costs least comes first: the mesh and its program are there.
-            again = tried = self._as_simulated(self._inside(again, _slightly_outside(again, self.verify), MENDING.loss), MENDING.blurred)
+            again = tried = self._as_simulated(self._inside(again, _slightly_outside(again, self.verify), MENDING.loss), SEARCH.passable)
         again = self._refined(again, self._meshed(again, again.was_simulated & ((fine is not None) | ~again.verified)), fine)
         # On a finer mesh, too, a point may exceed limits between nodes, and by less.
         moved = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
@@ -203,7 +203,7 @@ class _Mending:
         if solved.status != CONVERGED:
             return None
         found = self.marked(from_vectors(nlp, solved.z[None], points.solver, points.stats, **_judged(points[[row]])))
-        found = self._as_simulated(self._inside(found, _slightly_outside(found, self.verify)), MENDING.blurred)
+        found = self._as_simulated(self._inside(found, _slightly_outside(found, self.verify)), SEARCH.passable)
         return found if found.verified[0] else None
 
     @_unless_stopped
@@ -280,7 +280,7 @@ def _slightly_outside(points: Points, verify: float) -> list[int]:
     """The points whose only faults in a simulation are that they exceed limits a little, mostly between nodes, and that objectives are a
     little off. A solve on their own mesh, whose program exists already, costs far less than on any other."""
     beyond = (points.simulated_violation > verify) & (points.simulated_violation <= MENDING.slightly) & (points.status == CONVERGED)
-    return np.flatnonzero(beyond & (points.defect <= verify) & (missed(points) <= MENDING.blurred).all(axis=1)).tolist()
+    return np.flatnonzero(beyond & (points.defect <= verify) & (missed(points) <= SEARCH.passable).all(axis=1)).tolist()
 
 
 def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: float = np.inf) -> Points:

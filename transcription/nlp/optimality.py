@@ -29,10 +29,6 @@ SMALL_MULTIPLIERS = 1e-6
 """What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
 that the residual asks for, far more than round-off."""
 
-ACTIVE, ALONG, NOTHING_LEFT = 1e-4, 1e-3, 1e-10
-"""Slack of an inequality, in scales, up to which it has a multiplier in the first solve for multipliers; the cosine of the angle between
-what that leaves and another inequality from which on this joins, unless what is left is nothing."""
-
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
@@ -281,14 +277,14 @@ def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) ->
     M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(np.hypot(slack, small))])])
     full = np.vstack([M, np.r_[np.ones(m), np.zeros(k)]])
     right = np.r_[np.zeros(len(M)), 1.0]
-    x, taken, lengths = np.zeros(full.shape[1]), np.r_[np.ones(m, dtype=bool), slack <= ACTIVE], np.linalg.norm(full, axis=0)
+    x, taken, lengths = np.zeros(full.shape[1]), np.r_[np.ones(m, dtype=bool), slack <= 1e-4], np.linalg.norm(full, axis=0)
     while True:
-        # Of hundreds of limits a flight is near few are active: the others join where they would make the residual smaller.
+        # Of hundreds of limits that a flight is near few are active: others join where they would make the residual smaller.
         rows = full[:, taken].any(axis=1)
         x[taken] = nnls(full[np.ix_(rows, taken)], right[rows], maxiter=10 * full.shape[1])[0]
         left = right - full @ x
-        missing = ~taken & (full.T @ left > ALONG * np.linalg.norm(left) * lengths)
-        if not missing.any() or np.linalg.norm(left) <= NOTHING_LEFT:
+        missing = ~taken & (full.T @ left > 1e-3 * np.linalg.norm(left) * lengths)
+        if not missing.any() or np.linalg.norm(left) <= 1e-10:
             break
         taken |= missing
     # nnls solves normal equations, which lose half of the digits. Orthogonal factors lose none, and truncate nothing where slacks are tiny,
