@@ -211,12 +211,14 @@ class MultistartSolver:
             return self.closest
         if self.starts is None and i not in self.stopping:
             self.stopping[i] = MultistartStopping(self._unseen)
-            solved = self.seek(task, self.stopping[i])
+            begun, solved = None, self.seek(task, self.stopping[i])
         else:
+            begun = self.nearest(task)
             solved = self.solve(task)
         solved = self.from_rival(solved, task)
         for start in self._known.Z[: self._given] if solved.status != CONVERGED and not self.closest else ():
-            solved = min(solved, self.from_vector(start, task), key=task.rank)
+            if begun is None or (start != begun).any():
+                solved = min(solved, self.from_vector(start, task), key=task.rank)
         return solved
 
     def seek(self, task: Scalarised, stopping_rule: MultistartStopping) -> Solved:

@@ -169,7 +169,7 @@ def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.n
     for (i, j), pair in zip(pairs, both, strict=True):
         if among(pair[None], known)[0]:
             continue
-        if not left or fruitless == len(archive):
+        if left <= 0 or solves.left <= 0 or fruitless == len(archive):
             break
         found = solves(archive.Z[[j]], archive.F[[i]], span[None])
         gained = found.status[0] == CONVERGED and ((archive.F[i] - found.F[0]) / span).min() > BETTER

@@ -219,7 +219,7 @@ class WorkLimits:
 
     @property
     def search(self) -> float:
-        """After which no round of a search begins, and no polish goes on but for ends and one solve for each point."""
+        """After which no round of a search begins, and no polish goes on but for one solve for each point."""
         return 2 * self.most
 
 

@@ -17,6 +17,9 @@ from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_
 
 __all__ = ["Interrupts", "Stopped", "work_on_trajectories"]
 
+TIME_LIMIT = "time limit"
+"""Reason to end work that has taken as long as it may."""
+
 
 class Interrupts(AbstractContextManager["Interrupts"]):
     """Clock and Ctrl-C handler of long work; a context manager, within which the work is asked to end (`transcription.stopping`).
@@ -71,7 +74,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
     def _own_reason(self) -> str:
         if self._interrupted:
             return "interrupted"
-        return "time limit" if self._time_limit is not None and self._here > self._time_limit else ""
+        return TIME_LIMIT if self._time_limit is not None and self._here > self._time_limit else ""
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         if os.getpid() != self._process:

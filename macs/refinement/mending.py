@@ -212,7 +212,7 @@ class _Mending:
         weight on every objective, the objectives without are minimised once. `points` itself if none is better."""
         m, scales, better = points.F.shape[1], objective_scales(points), dict[int, Points]()
         best = extremes(points.F) if len(points) else np.zeros(0)
-        most = self._solves.counts.work + self._most_work(points, 0)
+        most = self._solves.counts.work + min(self._most_work(points, 0), WORK.most)
         for i in self._meshed(points, points.verified) if m > 1 and differentiable(self.programs.problem) else ():
             own = points[i].weights
             weights = (best == i).astype(float) if own is None else np.array(list(own.values()))

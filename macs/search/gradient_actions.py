@@ -20,7 +20,7 @@ from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_between
 from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
-from ..gradients.scalarised import WORK, GradientSolves, Scalarised
+from ..gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
 from ..pareto.archive import Archive
 from ..pareto.dominance import CURVE, extremes, feasible_and_no_worse, nearest, ranges
 from ..pareto.spread import Guide
@@ -119,18 +119,23 @@ class Opening:
     def _solved(self, solver: MultistartSolver) -> Evaluation:
         """The ends of the front and a compromise between them; where the search chooses its inner solvers, points along the front instead,
         each by multistart. Fewer if asked to end early, or if solves fail."""
-        found = lexicographic_ends(solver, most=WORK.most)  # the polish improves ends, too
-        self.multimodal = any(one.optima() > 1 for one in solver.stopping.values())
-        for i, one in solver.stopping.items():
-            self.unimodal[i] = one.enough and one.optima() == 1
-        if self.unimodal.all():
-            solver.most = 0  # nothing else is expected between the ends, either
-        if 1 < len(found) == sum(one.status == CONVERGED for one in found):
-            F = np.array([one.F for one in found])
-            if self._evaluator.ways:
-                found += solve_tasks(solver, tasks_between(F, ranges(F), max(self._points, len(F) + 1), METHODS[0]))
-            else:
-                found.append(solver.solve(Scalarised(F.min(axis=0), ranges(F))))
+        # The polish improves ends, too; where few starts are worth making, long solves are not, either.
+        with solver.solves.at_most(MULTISTART.iterations if solver.starts else MOST_ITERATIONS):
+            first = solver.single(0)
+            if solver.starts and first.status != CONVERGED:
+                return self.optima  # agents' own solves begin elsewhere
+            found = lexicographic_ends(solver, lambda i: solver.single(i) if i else first, WORK.most)
+            self.multimodal = any(one.optima() > 1 for one in solver.stopping.values())
+            for i, one in solver.stopping.items():
+                self.unimodal[i] = one.enough and one.optima() == 1
+            if self.unimodal.all():
+                solver.most = 0  # nothing else is expected between the ends, either
+            if 1 < len(found) == sum(one.status == CONVERGED for one in found):
+                F = np.array([one.F for one in found])
+                if self._evaluator.ways:
+                    found += solve_tasks(solver, tasks_between(F, ranges(F), max(self._points, len(F) + 1), METHODS[0]))
+                else:
+                    found.append(solver.solve(Scalarised(F.min(axis=0), ranges(F))))
         assert isinstance(self._evaluator, Bilevel)
         return _feasible_of(found, self._evaluator)
 
@@ -204,8 +209,7 @@ def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator,
         count = max(state.evaluations // settings.polish_every - memory.solves, least)
     else:
         count = GRADIENT_RULES.polish_per_point * settings.archive
-    # Ends and one solve for each point are always made.
-    limits = (0, np.inf) if rounds is None else (settings.archive + 2 * state.archive.F.shape[1], WORK.search)
+    limits = (0, np.inf) if rounds is None else (settings.archive, WORK.search)
     solves = BudgetedSolves(evaluator, count, log, memory.failed_pairs, *limits)
     # A later round is polished if it found something new: not all starts are alike.
     unimodal = bool(memory.unimodal.all()) and memory.polished is None

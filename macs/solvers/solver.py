@@ -29,7 +29,7 @@ from ..fronts.builders import from_archive, from_vector_problem, no_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine
-from ..io.interrupts import Interrupts, work_on_trajectories
+from ..io.interrupts import TIME_LIMIT, Interrupts, work_on_trajectories
 from ..refinement.mesh_search import SearchMeshes, search_meshes
 from .method import SearchMethod
 from .progress import Progress
@@ -104,7 +104,8 @@ class Solver(SearchMethod):
             simulated.
         time_limit : float, optional
             Seconds after which the call ends with its results so far, as it does after Ctrl-C: within a second or two, whatever it is
-            doing. A run that this ends is recorded as not reproducible. If nothing was evaluated yet, the front is empty.
+            doing. The last quarter is left for simulations, and for solving again what these do not confirm. A run that this ends is
+            recorded as not reproducible. If nothing was evaluated yet, the front is empty.
         progress : bool, optional
             Show the progress of the search on stderr. Default: on a terminal and in a notebook, from the third second on.
         callback : callable, optional
@@ -184,7 +185,9 @@ class Solver(SearchMethod):
                     earlier = chosen.counts
                     transcription = chosen.search if self.remeshes else chosen.fine or chosen.search
                     start = chosen.ends if start is None and self.remeshes else start
-                run = self._search_run(compiled, transcription, solver, level, start, replace(call, time_limit=None))
+                # The rest of a limit is for simulations and re-solves: without them, nothing that was found can be trusted.
+                within = None if call.time_limit is None else max(0.75 * call.time_limit - interrupts.elapsed, 1e-3)
+                run = self._search_run(compiled, transcription, solver, level, start, replace(call, time_limit=within))
             except Stopped as reason:
                 spent = {"wall_time": interrupts.elapsed, "seed": call.seed, "tolerance": call.tolerance}
                 stats = costs(earlier, **spent, stopped=str(reason), reproducible=False)
@@ -192,8 +195,9 @@ class Solver(SearchMethod):
             before = interrupts.elapsed
             front = _or_ends(run.go(), chosen)
             front = front.replace(stats=more_costs(front.stats, earlier, before, ""))
+            ended = front.stats["stopped"] in (*ENDED, TIME_LIMIT) and not interrupts.reason
             try:
-                return self.finish(front, verify, call.progress, chosen) if front.stats["stopped"] in ENDED else front.verify(verify)
+                return self.finish(front, verify, call.progress, chosen) if ended else front.verify(verify)
             except Stopped as reason:
                 return front.replace(stats=more_costs(front.stats, Counts(), 0.0, str(reason)))
             except Exception as error:
