@@ -64,8 +64,10 @@ def polish(
         return archive
     optima = archive.take(np.arange(0)) if optima is None else optima
     archive, solved = _settled(archive, optima), optima.F
+    solves.promise(limit + 2 * archive.F.shape[1])  # for each point one, and two for each end
     if archive.F.shape[1] > CURVE:
         ends = _ends(archive, ranges(archive.F), solves, solved)
+        solves.promise(limit)
         surface = cover(archive, ends, solves, limit, guide)
         archive, solved = _thinned(surface.points(), limit, exponent, guide), np.vstack([solved, surface.solved])
         if not solves.left:
@@ -330,8 +332,8 @@ class PolishLog:
 
 
 class BudgetedSolves:
-    """Gradient solves up to a number, and, after the `least` number of them, up to the most work of the whole search; after a request to
-    end early no more are made. `failed_pairs` (k, 2 m) has the objectives of points and of the neighbours from which nothing better was
+    """Gradient solves up to a number and, but for those that are promised, up to the most work of the whole search; after a request to end
+    early no more are made. `failed_pairs` (k, 2 m) has the objectives of points and of the neighbours from which nothing better was
     found for them."""
 
     def __init__(
@@ -340,11 +342,10 @@ class BudgetedSolves:
         left: int,
         log: PolishLog | None = None,
         failed_pairs: np.ndarray | None = None,
-        least: int = 0,
         most_work: float = np.inf,
     ) -> None:
-        self._evaluator, self._log, self._least, self._most_work = evaluator, log, least, most_work
-        self._made, self._answers = 0, dict[bytes, Evaluation]()
+        self._evaluator, self._log, self._most_work = evaluator, log, most_work
+        self._made, self._promised, self._answers = 0, 0, dict[bytes, Evaluation]()
         self.left, self.stopped, self.failed_pairs = left, False, failed_pairs
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
@@ -372,11 +373,15 @@ class BudgetedSolves:
         """Mask (k,) of the feasible results, which may include solves that ran out of iterations."""
         return (found.status == CONVERGED) | (found.violation <= self._evaluator.tolerance)
 
+    def promise(self, count: int) -> None:
+        """Let so many more solves be made, whatever work was done, up to their number."""
+        self._promised = self._made + count
+
     @property
     def _worked_enough(self) -> bool:
         """Whether no further solve is to be made, whatever their number; those in the log are."""
         known = 0 if self._log is None else len(self._log)
-        return self._made >= max(self._least, known) and self._evaluator.counts.work >= self._most_work
+        return self._made >= max(self._promised, known) and self._evaluator.counts.work >= self._most_work
 
     def _solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> Evaluation:
         """The result of the next solve, one row, from the log or made now; no row if asked to end early."""

@@ -9,6 +9,7 @@ from functools import partial, wraps
 from typing import Any
 
 import numpy as np
+from scipy.sparse.csgraph import minimum_spanning_tree
 
 from transcription import from_dict
 from transcription.inner import Propagate
@@ -29,7 +30,7 @@ from ..io.console import working
 from ..pareto.dominance import extremes, separate
 from ..pareto.spread import Guide, spread
 from .front_refinement import FrontRefinement
-from .mesh_loop import OnMesh, Programs, differentiable
+from .mesh_loop import LOOP, OnMesh, Programs, differentiable
 from .mesh_search import SEARCH
 
 
@@ -61,20 +62,22 @@ def mended(
     fine: Meshed | None = None,
     ends: Points | None = None,
     guide: Guide | None = None,
+    size: int = 0,
 ) -> Points:
     """The front with its unverified points re-solved, all on a `fine` mesh first, if that of the search is known to be too coarse; with
-    those of the `ends` that are better in an objective than all of the points. A guide says how densely points are wanted."""
+    those of the `ends` that are better in an objective than all of the points. A guide says how densely points are wanted, and `size` how
+    many at least."""
     if not len(points):
         return verified(points, verify)
     with working(time_limit, progress) as (show, interrupts):
         job = _Mending(points, verify, show, ends)
         again = job.resolve_unverified(fine)
         joined = job.strong(job.with_ends(again))
-        if joined is job.points and joined.verified.all():
+        if joined is job.points and joined.verified.all() and len(joined) >= size:
             return _separate(joined[best_rows(joined)]).sorted()
         kept = _separate(joined[best_rows(joined, verify * objective_scales(joined))])
-        if joined is not job.points:
-            kept = job.marked(job.fill_gaps(kept, len(points), guide))
+        if joined is not job.points or len(kept) < size:
+            kept = job.marked(job.fill_gaps(kept, max(size, len(points)), guide))
         return job.with_costs(job.with_reasons(kept.sorted()), interrupts.elapsed, interrupts.reason)
 
 
@@ -177,7 +180,14 @@ class _Mending:
             return points
         most = self._solves.counts.work + self._most_work(points, size - int(points.verified.sum()))
         tried = np.empty((0, points.F.shape[1]))
-        while points.verified.any() and _needed(points).sum() < size and self._solves.counts.work < most and not stopping():
+        fruitless = 0
+        while (
+            points.verified.any()
+            and _needed(points).sum() < size
+            and fruitless < LOOP.patience
+            and self._solves.counts.work < most
+            and not stopping()
+        ):
             scales = objective_scales(points)
             target = _target(points, tried, scales, guide)
             if target is None:
@@ -189,9 +199,11 @@ class _Mending:
             new = None
             with suppress(Stopped):  # which ends the loop
                 new = next((one for one in found if one is not None), None)
+            fruitless, before = fruitless + 1, int(points.verified.sum())
             if new is not None:
                 joined = Points.concatenate([points, new]).replace(stats=points.stats, solver=points.solver)
                 points = _separate(joined[best_rows(joined)])
+                fruitless = fruitless if points.verified.sum() <= before else 0
         return points[_within(points, size, guide)]
 
     def _solved(self, points: Points, row: int, task: Scalarised) -> Points | None:
@@ -334,15 +346,15 @@ def _needed(points: Points) -> np.ndarray:
 
 def _target(points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide | None) -> np.ndarray | None:
     """The next target (m,): the unverified point nearest to a verified one; without any, the middle of the widest gap between verified
-    points that are neighbours in the first of two objectives. None if all were tried."""
+    points that are neighbours, on the tree of least length that joins all. None if all were tried."""
     good, others = points.simulated_F[points.verified], points.F[~points.verified]
     others = others[[not (row == tried).all(axis=1).any() for row in others]]
     if len(others):
         return others[np.argmin(np.linalg.norm((others[:, None] - good) / scales, axis=2).min(axis=1))]
-    if len(points.goals) != 2 or len(good) < 2:
+    if len(good) < 2:
         return None
-    good = good[np.argsort(good[:, 0], kind="stable")]
-    middles, widths = 0.5 * (good[1:] + good[:-1]), np.linalg.norm(np.diff(good, axis=0) / scales, axis=1)
+    tree = minimum_spanning_tree(np.linalg.norm((good[:, None] - good) / scales, axis=2)).tocoo()
+    middles, widths = 0.5 * (good[tree.row] + good[tree.col]), tree.data
     if guide is not None:
         widths *= guide.factors(good, middles)
     new = [k for k in np.argsort(-widths, kind="stable").tolist() if not (middles[k] == tried).all(axis=1).any()]

@@ -209,8 +209,7 @@ def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator,
         count = max(state.evaluations // settings.polish_every - memory.solves, least)
     else:
         count = GRADIENT_RULES.polish_per_point * settings.archive
-    limits = (0, np.inf) if rounds is None else (settings.archive, WORK.search)
-    solves = BudgetedSolves(evaluator, count, log, memory.failed_pairs, *limits)
+    solves = BudgetedSolves(evaluator, count, log, memory.failed_pairs, np.inf if rounds is None else WORK.search)
     # A later round is polished if it found something new: not all starts are alike.
     unimodal = bool(memory.unimodal.all()) and memory.polished is None
     exponent = settings.variant.energy_exponent

@@ -230,7 +230,7 @@ class MACS(Settings, Solver):
         if not self.remeshes or verify is None:
             return front.verify(verify)
         fine, ends = (None, None) if chosen is None else (chosen.fine, chosen.ends)
-        return Front.of(mended(front, verify, None, progress, fine, ends, guide))
+        return Front.of(mended(front, verify, None, progress, fine, ends, guide, self.archive))
 
     def check_objectives(self, m: int) -> None:
         """Raise ValueError if the archive is smaller than the number m of objectives, whose best points it keeps."""

@@ -384,7 +384,8 @@ def test_solves_begin_where_points_are_good_and_stay_in_the_better_valley() -> N
 
 def test_the_same_solve_is_made_once_and_none_after_the_most_work() -> None:
     evaluator = Answers([1.0, 1.0], [2.0, 2.0], [3.0, 3.0])
-    solves = BudgetedSolves(evaluator, 5, least=2, most_work=0.0)  # type: ignore[arg-type]
+    solves = BudgetedSolves(evaluator, 5, most_work=0.0)  # type: ignore[arg-type]
+    solves.promise(2)
     starts, weights = np.array([[0.0], [0.0], [1.0], [2.0]]), np.ones((4, 2))
     found = solves(starts, np.zeros((4, 2)), weights)
     assert found.status.tolist() == [CONVERGED, CONVERGED, CONVERGED, FAILED]
