@@ -73,6 +73,7 @@ def polish(
         if not solves.left:
             return archive
     archive, waiting = _descend(archive, solves, solved, exponent, guide)
+    solves.promise(archive.F.shape[1])
     for _ in range(0 if alike else POLISH.rounds):
         better = _helped_by_neighbours(archive, solves)
         if better is archive:
@@ -177,6 +178,7 @@ def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.n
         gained = found.status[0] == CONVERGED and ((archive.F[i] - found.F[0]) / span).min() > BETTER
         left, fruitless = left - 1, 0 if gained else fruitless + 1
         if gained:
+            solves.promise(m)
             better = Archive.of(found, np.ones(1, dtype=bool)).joined(better)
         else:
             failed.append(pair[None])
@@ -358,7 +360,6 @@ class BudgetedSolves:
             same = b"".join(part.tobytes() for part in task)
             if same not in self._answers:
                 if self._worked_enough:
-                    self.left = 0
                     break
                 found = self._solve(*task)
                 if not len(found.F):

@@ -202,6 +202,7 @@ class _Mending:
             fruitless, before = fruitless + 1, int(points.verified.sum())
             if new is not None:
                 joined = Points.concatenate([points, new]).replace(stats=points.stats, solver=points.solver)
+                joined = joined[np.flatnonzero(_needed(joined) | (target != joined.F).any(axis=1))]  # not what it takes the place of
                 points = _separate(joined[best_rows(joined)])
                 fruitless = fruitless if points.verified.sum() <= before else 0
         return points[_within(points, size, guide)]
@@ -338,9 +339,10 @@ def _within(points: Points, size: int, guide: Guide | None) -> np.ndarray:
 
 
 def _needed(points: Points) -> np.ndarray:
-    """Mask (n,) of the points that are verified or the best of an objective."""
-    needed = points.verified.copy()
-    needed[extremes(points.F)] = True
+    """Mask (n,) of the points that are verified or, by more than may be lost, the best of an objective."""
+    best, needed = extremes(points.F), points.verified.copy()
+    known = points.simulated_F[needed].min(axis=0, initial=np.inf)
+    needed[best[points.F.min(axis=0) < known - MENDING.loss * objective_scales(points)]] = True
     return needed
 
 

@@ -91,7 +91,9 @@ class OnMesh:
     def error(self) -> float:
         """The largest error, or change from the previous mesh, in units of the tolerance."""
         wanted = self.verdict.wanted
-        unsettled = max(self.change, self.verdict.gain if self.gaining else 0.0) / wanted.settled
+        # What no other mesh has confirmed is less wrong than what a simulation refutes.
+        change = self.change if np.isfinite(self.change) else 10.0 * wanted.settled
+        unsettled = max(change, self.verdict.gain if self.gaining else 0.0) / wanted.settled
         return max(self.verdict.error, unsettled if wanted.confirmed else 0.0)
 
     def complaints(self) -> list[str]:

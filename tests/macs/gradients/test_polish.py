@@ -390,4 +390,4 @@ def test_the_same_solve_is_made_once_and_none_after_the_most_work() -> None:
     found = solves(starts, np.zeros((4, 2)), weights)
     assert found.status.tolist() == [CONVERGED, CONVERGED, CONVERGED, FAILED]
     assert found.F[:3, 0].tolist() == [1.0, 1.0, 2.0]
-    assert (len(evaluator.starts), solves.left, solves.stopped) == (2, 0, False)
+    assert (len(evaluator.starts), solves.left, solves.stopped) == (2, 3, False)
