@@ -73,7 +73,7 @@ def polish(
         if not solves.left:
             return archive
     archive, waiting = _descend(archive, solves, solved, exponent, guide)
-    solves.promise(archive.F.shape[1])
+    solves.promise(1)  # and more as long as that helps
     for _ in range(0 if alike else POLISH.rounds):
         better = _helped_by_neighbours(archive, solves)
         if better is archive:

@@ -272,21 +272,23 @@ class _Mending:
         def enough(point: OnMesh) -> bool:
             return largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
 
-        most = self._most_work(points, len(rows), fine)
+        # Where only objectives are off, those of the simulation are known, too.
+        blurred = fine is None and bool(feasible_as_simulated(points, self.verify)[rows].all())
+        most = self._most_work(points, len(rows), fine, 0.0 if blurred else MENDING.share)
         job = FrontRefinement(points, wanted, MENDING.meshes, rows, most, self.programs, enough, MENDING.patience, first=fine)
         job.go(self.show)
         again = self.marked(job.points(0.0, ""))
         # What refinement would wish for besides is no complaint about a point that is verified.
         return again.replace(notes=["" if i in rows and again.verified[i] else note for i, note in enumerate(again.notes)])
 
-    def _most_work(self, points: Points, count: int, fine: Meshed | None = None) -> float:
-        """The work left for so many points, in iterations times variables; no limit where there was no search, so that the mesh is the
-        only task."""
+    def _most_work(self, points: Points, count: int, fine: Meshed | None = None, share: float = MENDING.share) -> float:
+        """The work left for so many points, in iterations times variables, and a share of what the front cost; no limit where there was no
+        search, so that the mesh is the only task."""
         if not points.stats["evaluations"]:
             return np.inf
         spent = points.stats.get("work", 0) - self._work + WORK.building * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places])) if fine is None else len(self.programs(fine).variables)
-        return max(MENDING.share * self._work - spent, MENDING.each * count * size, MENDING.least)
+        return max(share * self._work - spent, MENDING.each * count * size, MENDING.least)
 
 
 def _slightly_outside(points: Points, verify: float) -> list[int]:
