@@ -168,7 +168,7 @@ def payoff(
         front = job.front(ends, job.ranges(ends), sort=False)
         return front if job.solver.closest is None else front.replace(message=f"nothing feasible was found; {conflict(job.nlp, front[0])}")
 
-    return job.run(work, resolve_unverified)
+    return job.run(work, resolve_unverified, ends=True)
 
 
 def sweep(
@@ -297,8 +297,9 @@ class _Job:
         self.solver.stopping.update(stopping or {})
         self._stopping = self.solver.stopping
 
-    def run(self, work: Callable[[], Front], again: Callable[[Points, float], Points]) -> Front:
-        """The front that `work` returns, on the transcription that was given or on one that is found, simulated.
+    def run(self, work: Callable[[], Front], again: Callable[[Points, float], Points], ends: bool = False) -> Front:
+        """The front that `work` returns, on the transcription that was given or on one that is found, simulated; where only its `ends` are
+        asked for, those by which the mesh was found, on meshes of their own.
 
         Within, the time limit and Ctrl-C ask the work to end, and its progress is shown. Unless the transcription was given, points that
         are not verified are solved again by `again`.
@@ -307,12 +308,20 @@ class _Job:
         with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             try:
+                chosen = None
                 if not self.fixed:
                     given = partial(beginning, self._terms.start)
-                    chosen = search_meshes(self._statement, verify or VERIFY, self.solves.tolerance, show, given, self._terms.count)
+                    count, tolerance = self._terms.count, self.solves.tolerance
+                    chosen = search_meshes(self._statement, verify or VERIFY, tolerance, show, given, count, knots=ends)
                     self.solves.counts = chosen.counts
-                    self.begin(chosen.fine or chosen.search, chosen.ends, chosen.rules)
-                front = work()
+                    if not (ends and chosen.ends is not None and len(chosen.ends) == len(self.problem.goals)):
+                        self.begin(chosen.fine or chosen.search, chosen.ends, chosen.rules)
+                        chosen = None
+                if chosen is None:
+                    front = work()
+                else:
+                    self._stopping = dict(chosen.rules)
+                    front = Front.of(chosen.ends.replace(solver=self._about, stats=self._stats()))
             except Stopped as reason:
                 self._stopped = str(reason)
                 return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))

@@ -67,7 +67,7 @@ def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict
     for _ in range(ENDS.rounds):
         improved = False
         for i, k in permutations(range(m), 2):
-            if optima[k].status != CONVERGED or solver.is_least(optima[i], Scalarised.single(i, m)):
+            if optima[k].status != CONVERGED or solver.convex[i] or solver.is_least(optima[i], Scalarised.single(i, m)):
                 continue
             spans = _spans(optima)
             if (i, k) in tried and (np.abs(optima[k].F - tried[i, k]) <= ENDS.loose * spans).all():
@@ -155,7 +155,7 @@ def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], fo
     """Solve each task from another start; returns whether any result was replaced."""
     replaced = False
     for k, task in enumerate(tasks):
-        if solver.drawn_enough or solver.solves.counts.work >= limit or stopping():
+        if solver.drawn_enough or solver.convex.all() or solver.solves.counts.work >= limit or stopping():
             return False
         with solver.solves.at_most(MULTISTART.iterations):
             other = solver.from_drawn(task, found[k] if found[k].status == CONVERGED else None)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from transcription.base import INFEASIBLE, NLP
-from transcription.nlp.derivatives import linear_objectives, objective_gradients
+from transcription.nlp.derivatives import convex_objectives, linear_objectives, objective_gradients
 from transcription.nlp.program import nlp_scales
 from transcription.nlp.scalarized import Solved
 from transcription.smooth import Smooth
@@ -36,6 +36,8 @@ class MultistartLimits:
     clearly: float = 1e-7  # difference in alpha by which a result is clearly better: the accuracy of solves
     iterations: int = 200  # most of each further start
     held: int = 50  # most iterations of a solve for given times: one that takes more has no feasible point, or is not convex
+    times: int = 16  # parts of the range of a free time, at whose ends problems are solved that are convex for a given time,
+    beneath: int = 2  # from the longest one on, until none of so many has a feasible point
     infeasible: tuple[int, int] = (8, 16)  # fewest and most starts without a feasible vector; between them, what took `WORK.little`
     everywhere: int = 3  # starts from everywhere before only each second one is: the others are near the best that is known
     hopeless: float = 100.0  # scales by which propagated states violate constraints so that the states of the guess are the better start
@@ -109,7 +111,7 @@ class MultistartStopping:
 
     def __init__(self, unseen: float = MULTISTART.unseen) -> None:
         self._losses: list[float] = []
-        self.starts = 0
+        self.starts, self.convex = 0, False  # convex: for given times, and these were tried: no start finds another optimum
         self._last, self._unseen = 0, unseen
 
     def add(self, loss: float | None) -> bool:
@@ -142,7 +144,12 @@ class MultistartStopping:
     @property
     def found_once(self) -> bool:
         """Whether one start alone found the best of several optima."""
-        return self.hits() == 1 < self.optima()
+        return self.several and self.hits() == 1
+
+    @property
+    def several(self) -> bool:
+        """Whether starts found several optima that other starts may improve."""
+        return self.optima() > 1 and not self.convex
 
     @property
     def complete(self) -> bool:
@@ -156,7 +163,7 @@ class MultistartStopping:
         """Whether further starts are not expected to find another optimum, or have found nothing better for long."""
         if not self.converged:
             return self.starts >= MULTISTART.fewest
-        if self.complete:
+        if self.convex or self.complete:
             return True
         return self.starts >= min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most)
 
@@ -185,6 +192,7 @@ class MultistartSolver:
         self.nlp, self.starts, self.solves, self.rng = nlp, starts, solves, rng
         self.stopping, self.most, self._unseen = dict[int, MultistartStopping](), most, unseen
         self.closest: Solved | None = None  # what violates least, where nothing is feasible
+        self._timed = False  # whether optima for given times were sought
         self._starts = Starts(nlp, rng)
         Z = np.empty((0, len(nlp.variables))) if given is None else given
         self._given = len(Z)
@@ -195,8 +203,38 @@ class MultistartSolver:
         """Whether the largest number of starts has been drawn."""
         return self._starts.drawn >= self.most
 
+    @property
+    def convex(self) -> np.ndarray:
+        """Which objectives (m,) have one optimum for each time: no start finds another than what is best for some time."""
+        return convex_objectives(self.nlp)
+
+    def _over_times(self) -> None:
+        """Once, where there is a free time: add to what is known the optima for given times, from the longest on, each from the one before,
+        of the objectives that are convex then, and not of that time alone."""
+        times, m = self.nlp.times, len(self.nlp.problem.goals)
+        if self._timed or not len(times) or not self.convex.any():
+            return
+        self._timed, (rows, columns) = True, objective_gradients(self.nlp).sparsity_out(0).get_triplet()
+        for i in np.intersect1d(np.array(rows)[~np.isin(columns, times)], np.flatnonzero(self.convex)).tolist():
+            z, failed = self._known.Z[0] if len(self._known) else self._starts.draw()[0], 0
+            for share in np.linspace(1.0, 0.0, MULTISTART.times + 1):
+                given = self._with_times(z, self.nlp.lower[times] + share * self.nlp.span[times])
+                with self.solves.at_most(MULTISTART.held):
+                    found = self.solves(self.nlp, given, Scalarised.single(i, m), held=times)
+                failed = 0 if found.status == CONVERGED else failed + 1
+                if failed == MULTISTART.beneath or stopping():
+                    break
+                z = z if failed else self._added(found).z
+
+    def _added(self, solved: Solved) -> Solved:
+        """A result, which is known from now on if it converged."""
+        if solved.status == CONVERGED:
+            self._known = self._known.joined(Archive(solved.z[None], solved.F[None], np.array([solved.violation])))
+        return solved
+
     def solve(self, task: Scalarised, start: np.ndarray | None = None) -> Solved:
         """The best result of `starts` solves, the first from `start` (n,) or the best known vector for this problem."""
+        self._over_times()
         first = start if start is not None else self.nearest(task)
         found = [] if first is None else [self.from_vector(first, task)]
         for _ in range((self.starts or 1) - len(found)):
@@ -231,6 +269,7 @@ class MultistartSolver:
     def first(self, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
         """The result of the first of several starts, from something feasible if it leads to nothing feasible; one that is drawn is given up
         soon: on a coarse mesh nothing may be feasible. See `with_feasible_start`."""
+        self._over_times()
         if self.closest is not None or len(self._known):
             return self.with_feasible_start(self.closest or self.solve(task), task, tries)
         with self.solves.at_most(MULTISTART.iterations):
@@ -243,6 +282,7 @@ class MultistartSolver:
         """The best result, one of which is known, and those of drawn starts, until there are enough or so much work is done; twice as much
         where the best of several optima was found only once."""
         found, before, sides = list[Solved](), self.solves.counts.work, self._sides()
+        stopping_rule.convex = bool(self.convex[task.used].all())
         with suppress(Stopped):
             while not (
                 stopping_rule.enough
@@ -261,6 +301,8 @@ class MultistartSolver:
                 # One that is hardly better is the same optimum: that of the first start is as good.
                 if stopping_rule.add(task.optimum(found[-1])) or (not stopping_rule.converged and found[-1].violation < best.violation):
                     best = found[-1]
+        if stopping_rule.convex and (rival := self.rival(best, task)) is not None:
+            best = min(best, self.from_vector(rival, task, near=True), key=task.rank)
         return best, found
 
     def with_feasible_start(self, solved: Solved, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
@@ -291,10 +333,7 @@ class MultistartSolver:
 
     def from_vector(self, start: np.ndarray, task: Scalarised, near: bool = False) -> Solved:
         """The result of one solve from a vector (n,), or near it only; if it converged, later solves may begin at it."""
-        solved = self.solves(self.nlp, start, task, near)
-        if solved.status == CONVERGED:
-            self._known = self._known.joined(Archive(solved.z[None], solved.F[None], np.array([solved.violation])))
-        return solved
+        return self._added(self.solves(self.nlp, start, task, near))
 
     def from_drawn(self, task: Scalarised, best: Solved | None = None) -> Solved:
         """The result of a solve from a random start, with the states of the guess if propagated ones lead to no optimum and no `best` is

@@ -75,6 +75,10 @@ class Scalarised:
         """Alpha at a result; None if that did not converge."""
         return float(self.alpha(solved.F)) if solved.status == CONVERGED else None
 
+    def after(self, F: np.ndarray) -> Scalarised:
+        """The same on the next mesh, after a result with F (m,)."""
+        return self
+
     def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
         """The result of gradient solves from a vector (n,), or near it only."""
         return solves(nlp, start, self, near)
@@ -86,7 +90,7 @@ class EndLimits:
 
     room: float = 0.05  # how much worse other objectives may become, in units, before the end is also sought near where it was
     tied: float = 1e-6  # what counts as no loss of its own objective then, in units
-    close: float = 1e-3  # violation up to which a start on another mesh is nearly the end itself
+    close: float = 1e-3  # violation up to which a start on another mesh is nearly the end itself, and a solve may go on
     ties: int = 150  # most iterations of a solve that is to improve the others
     slack: float = 1e-5  # part of an objective's range that may be lost where the others cannot be improved without any loss
     weightless: float = 1e-4  # share of an objective in the sum that a point minimises up to which it has no weight
@@ -132,7 +136,7 @@ def without_loss(
         return end
     best = min([best, *(solve(other, freer, False) for other in others)], key=task.rank)
     exact = solve(best.z, task, True)
-    if exact.status != CONVERGED and task.alpha(exact.F) < task.alpha(end.F) - 0.1 * gain:
+    if exact.status != CONVERGED and exact.violation <= END.close and task.alpha(exact.F) < task.alpha(end.F) - 0.1 * gain:
         exact = solve(exact.z, task, True)  # much was gained before the iterations ran out
     if exact.status != CONVERGED:
         kept = exact.violation <= tolerance and bool((task.ceiling + 1e-3 * slack >= exact.F).all())
@@ -178,6 +182,10 @@ class LexicographicEnd(Scalarised):
     def sharp(self) -> np.ndarray:
         """See `Scalarised.sharp`: where the front is steep, the others are determined by the root of an error of the first."""
         return self.moving
+
+    def after(self, F: np.ndarray) -> LexicographicEnd:
+        """See `Scalarised.after`."""
+        return replace(self, known=F)
 
     def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
         """See `Scalarised.solve`."""

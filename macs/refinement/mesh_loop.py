@@ -242,7 +242,7 @@ class MeshLoop:
                     found.trouble = TROUBLES.get(status, f"on the next finer mesh its status is '{status}'")
                 break
             least = min(least, _achieved(reached, task))
-            present = reached
+            present, task = reached, task.after(reached.F)
             seen.append(present)
             if self.enough is not None and self.enough(present):
                 found.best = present

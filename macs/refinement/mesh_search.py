@@ -177,7 +177,7 @@ class MeshedOptimum:
 
     def certain(self, task: Scalarised) -> bool:
         """Whether no other start is expected to improve it: it is good, and all starts led to it, or the bounds allow no smaller value."""
-        alike = self.hits == self.rule.converged > 1
+        alike = self.rule.convex or self.hits == self.rule.converged > 1
         return self.good and (alike or is_least(self.nlp, self.z, task))
 
     @property
@@ -403,9 +403,10 @@ def search_meshes(
     show: Callable[[str], None] = lambda words: None,
     given: Callable[[NLP], np.ndarray | None] | None = None,
     starts: int | None = None,
+    knots: bool = False,
 ) -> SearchMeshes:
     """The problem's own default transcription; without one, those found from the ends of the front, which are sought on coarse meshes and
-    then on finer ones, until a simulation agrees and a finer mesh changes nothing."""
+    then on finer ones, until a simulation agrees and a finer mesh changes nothing; with `knots`, on edges at switches, too."""
     problem = statement.compile()
     if isinstance(statement, Problem) and statement.default_transcription is not None:
         return SearchMeshes(stated(statement.default_transcription), None, Counts())
@@ -414,7 +415,7 @@ def search_meshes(
     show("ends of the front on coarse meshes")
     limits, m = SEARCH.ends * verify, len(problem.goals)
     wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
-    loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, m * WORK.most, knots=False)
+    loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, m * WORK.most, knots=knots)
     tasks = [Scalarised.single(i, m) for i in range(m)]
     search = MeshSearch(loop, tasks, given or guessed_start, starts, np.random.default_rng(0), ends=True)
     search.go(coarse_meshes(statement))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from transcription.nlp.derivatives import convex_objectives
 from transcription.nlp.scalarized import Solved
 from transcription.stopping import stopping
 
@@ -125,9 +126,9 @@ class Opening:
             if solver.starts and first.status != CONVERGED:
                 return self.optima  # agents' own solves begin elsewhere
             found = lexicographic_ends(solver, lambda i: solver.single(i) if i else first, WORK.most)
-            self.multimodal = any(one.optima() > 1 for one in solver.stopping.values())
+            self.multimodal = any(one.several for one in solver.stopping.values())
             for i, one in solver.stopping.items():
-                self.unimodal[i] = one.enough and one.optima() == 1
+                self.unimodal[i] = one.enough and not one.several
             if self.unimodal.all():
                 solver.most = 0  # nothing else is expected between the ends, either
             if 1 < len(found) == sum(one.status == CONVERGED for one in found):
@@ -174,7 +175,7 @@ def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) ->
     rounds = state.rounds
     if rounds is None or not (settings.refines and evaluator.has_gradients and evaluator.ways and len(state.archive)):
         return
-    if (count := rounds.due - rounds.restarts) > 0 and isinstance(evaluator, Bilevel):
+    if (count := rounds.due - rounds.restarts) > 0 and isinstance(evaluator, Bilevel) and not convex_objectives(evaluator.nlp).all():
         memory = state.gradients
         solved, worse = restart_solves(state.archive, evaluator, settings.archive, count, rounds.restarts, memory.unimodal, state.rng)
         memory.multimodal, rounds.restarts = memory.multimodal or worse, rounds.due

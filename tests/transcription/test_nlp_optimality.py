@@ -393,3 +393,16 @@ def test_the_steepest_direction_does_not_depend_on_the_size_of_equations_or_grad
     s, multipliers = steepest(metric, equations, gradients)
     assert s / size == pytest.approx(np.array([[1 / 3, 0], [-1 / 3, 0], [0, 5]]), rel=1e-7, abs=1e-7)
     assert multipliers / size * small == pytest.approx(np.array([[2 / 3, 0]]), rel=1e-7)
+
+
+def test_states_are_eliminated_where_objectives_do_not_depend_on_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the least time nothing but that equations of states are met depends on states: no larger system is needed."""
+    monkeypatch.setattr("transcription.nlp.optimality.steepest", None)
+    problem = Problem("dash")
+    dash = problem.phase("dash", t0=0.0, tf=(0.5, 5.0))
+    x, v = dash.state("x", bounds=(-2, 2), initial=0, final=1), dash.state("v", bounds=(-2, 2), initial=0, final=0)
+    dash.dynamics(x=v, v=dash.control("u", bounds=(-1, 1)))
+    problem.minimize("time", dash.tf)
+    nlp = DFET(2, 2).nlp(problem)
+    solved = scalarize(nlp, nlp.first_guess(0.5 * (nlp.lower + nlp.upper)[nlp.free][None])[0], reference=np.zeros(1), weights=np.ones(1))
+    assert solved.F[0] == pytest.approx(2.0, abs=1e-6) and optimality(nlp, solved.z) < 1e-6

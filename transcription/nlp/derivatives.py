@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.sparse import csr_matrix, diags
+from scipy.sparse.csgraph import connected_components
 
 from problems.compiled import remembered
 
@@ -47,6 +50,44 @@ def linear_objectives(nlp: NLP) -> np.ndarray:
     m = len(nlp.problem.goals)
     places, _ = objective_gradients(nlp).jac_sparsity(0, 0).get_triplet()
     return ~np.isin(np.arange(m), np.array(places, dtype=int) % m)
+
+
+@remembered
+def convex_objectives(nlp: NLP) -> np.ndarray:
+    """Mask (m,) of the objectives that are quadratic and convex for given free times, of which there is at most one, with rows that are
+    linear then: each has one optimum for each time. Integrands and dynamics are tried at places, as many as a mesh has."""
+    m, kept, problem = len(nlp.problem.goals), np.setdiff1d(np.arange(len(nlp.variables)), nlp.times), nlp.problem
+    inputs = ca.veccat(*(symbols := problem.objectives.mx_in()))
+    F, rows = problem.objectives(*symbols), problem.constraints(*symbols)
+    if len(nlp.times) > 1 or (nlp.period > 0).any() or any(ca.which_depends(rows, inputs, 2, True)):
+        return np.zeros(m, dtype=bool)
+    found = np.array([not any(ca.which_depends(ca.gradient(F[i], inputs), inputs, 2, True)) for i in range(m)])
+    rng, second = np.random.default_rng(0), hessian(nlp)
+    lower, upper = np.where(np.isfinite(nlp.lower), nlp.lower, 0.0), np.where(np.isfinite(nlp.upper), nlp.upper, nlp.scale)
+    first, other = lower + rng.random((2, len(lower))) * (upper - lower)
+    other[nlp.times] = first[nlp.times]
+
+    def curved(z: np.ndarray, of_F: np.ndarray, of_g: Any) -> csr_matrix:
+        return csr_matrix(second(z, of_F, of_g).sparse())[kept][:, kept]
+
+    if np.abs(curved(first, np.zeros(m), rng.standard_normal(len(nlp.g_scale))).data).max(initial=0.0) > 0.0:
+        return np.zeros(m, dtype=bool)
+    for i in np.flatnonzero(found):
+        H = curved(first, np.eye(m)[i], 0.0)
+        slight = 1e-9 * np.abs(H.data).max(initial=0.0)
+        alike = np.abs((H - curved(other, np.eye(m)[i], 0.0)).data).max(initial=0.0) <= slight
+        found[i] = alike and all(least >= -slight for least in _least_eigenvalues(H))
+    return found
+
+
+def _least_eigenvalues(upper: csr_matrix) -> Iterator[float]:
+    """The least eigenvalue of each block of a symmetric matrix, given by its upper triangle, of which no block is coupled to another."""
+    whole = upper + upper.T - diags(upper.diagonal())
+    some = np.flatnonzero(np.diff(whole.indptr))
+    whole = whole[some][:, some]
+    labels = connected_components(whole, directed=False)[1]
+    for rows in np.split(np.argsort(labels, kind="stable"), np.cumsum(np.bincount(labels))[:-1]):
+        yield float(np.linalg.eigvalsh(whole[rows][:, rows].toarray()).min(initial=0.0))
 
 
 @remembered

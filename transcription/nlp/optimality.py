@@ -228,12 +228,14 @@ def _by_elimination(
     if not np.isfinite(left).all():
         return None
     if beyond:
-        others = _solved(factors, square.T, np.eye(r)[:, states:], "T")
+        others = _solved(factors, square.T, np.eye(r, beyond, -states), "T")
         taken = np.linalg.lstsq(by_free.T @ others, left, rcond=None)[0]
         adjoints += others @ taken
         left -= by_free.T @ (others @ taken)
     missed = np.abs(by_states.T @ adjoints - of_states.T).max(initial=0.0)
-    return (left, adjoints) if missed <= 1e-9 * np.abs(of_states).max(initial=0.0) else None
+    # Of times and controls alone, objectives have no derivatives by the states.
+    size = max(np.abs(of_states).max(initial=0.0), np.abs(of_free).max(initial=0.0))
+    return (left, adjoints) if missed <= 1e-9 * size else None
 
 
 def steepest(metric: Any, equations: Any, gradients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

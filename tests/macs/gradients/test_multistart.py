@@ -11,6 +11,7 @@ from macs.gradients.multistart import MULTISTART, MultistartSolver, MultistartSt
 from macs.gradients.scalarised import GradientSolves, Scalarised
 from problems import Problem, load
 from transcription import DFET
+from transcription.nlp.derivatives import convex_objectives
 from transcription.nlp.scalarized import Solved
 
 
@@ -96,6 +97,35 @@ def test_solves_for_times_at_their_bounds():
     assert solver.from_times(start, task, nlp.upper[nlp.times]).F[0] == pytest.approx(-1.0, abs=1e-6)
 
 
+def swing(tf: tuple[float, float] | float = (1.0, 20.0), cubic: float = 0.0, concave: bool = False) -> Problem:
+    """Two masses on springs brought to rest: time and effort; with a spring that is not linear, or a concave objective, if asked for."""
+    problem = Problem("swing")
+    phase = problem.phase("phase", t0=0.0, tf=tf)
+    x, y, v, w = (phase.state(name, bounds=(-5, 5), initial=float(name == "x"), final=0) for name in "xyvw")
+    u = phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=v, y=w, v=y - x + cubic * x**3, w=x - y + u)
+    problem.minimize("time", phase.tf)
+    problem.minimize("effort", phase.integral(u**2))
+    if concave:
+        problem.minimize("gain", -phase.integral(u**2))
+    return problem
+
+
+def test_which_objectives_are_convex_for_a_given_time():
+    """A concave one is not, nor is any where rates are not linear, or where a place in a narrow valley is chosen."""
+    assert convex_objectives(DFET(4, 3).nlp(swing(concave=True))).tolist() == [True, True, False]
+    assert convex_objectives(DFET(4, 3).nlp(swing(cubic=0.1))).tolist() == [False] * 2
+    assert convex_objectives(DFET(1, 1).nlp(wells([1.0] * 3))).tolist() == [False, True]
+
+
+def test_optima_for_several_times_take_the_place_of_other_starts():
+    """Effort falls with time, on steps where it hardly depends on it: solves stay on these; that for the longest time is the least."""
+    front = payoff(swing(), DFET(10, 3), seed=1)
+    assert front.stats["starts"]["effort"] == 1 and "one start" not in front.message
+    longest = optimize(swing(tf=20.0), DFET(10, 3), objective="effort")
+    assert front.objectives[:, 1].min() == pytest.approx(longest.objectives["effort"], rel=1e-6)
+
+
 @pytest.mark.slow
 @given(st.lists(st.sampled_from([1.0, 2.0, 5.0, None]), min_size=1, max_size=40), st.floats(-8e-6, 8e-6))
 def test_counts_of_starts(losses, noise):
@@ -174,10 +204,10 @@ def bounded(**objectives) -> Problem:
 
 def test_where_bounds_allow_no_less_no_other_start_is_made():
     """As one objective of two, whose end keeps it and has the least of the other, and alone. Bounds of x would allow less than there is."""
-    both = bounded(duration=lambda p, tf, x: 2 * tf - p, reach=lambda p, tf, x: x)
+    both = bounded(duration=lambda p, tf, x: 2 * tf - p, reach=lambda p, tf, x: x - 0.1 * x**2)
     front = payoff(both, DFET(2, 2))
     assert front.stats["starts"]["duration"] == 1 < front.stats["starts"]["reach"]
-    assert pytest.approx(np.array([[1.0, -1.0], [5.0, -3.0]]), abs=1e-6) == front.F
+    assert pytest.approx(np.array([[1.0, -1.1], [5.0, -3.9]]), abs=1e-6) == front.F
     point = optimize(both, DFET(2, 2), objective="duration")
     assert point.alone().stats["starts"] == 1 and point.F[0] == pytest.approx(1.0, abs=1e-6)
     alone = optimize(bounded(duration=lambda p, tf, x: 2 * tf - p))
