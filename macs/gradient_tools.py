@@ -308,20 +308,15 @@ class _Job:
         with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             try:
-                chosen = None
+                own = None
                 if not self.fixed:
-                    given = partial(beginning, self._terms.start)
-                    count, tolerance = self._terms.count, self.solves.tolerance
-                    chosen = search_meshes(self._statement, verify or VERIFY, tolerance, show, given, count, knots=ends)
-                    self.solves.counts = chosen.counts
-                    if not (ends and chosen.ends is not None and len(chosen.ends) == len(self.problem.goals)):
+                    given, count = partial(beginning, self._terms.start), self._terms.count
+                    chosen = search_meshes(self._statement, verify or VERIFY, self.solves.tolerance, show, given, count, knots=ends)
+                    self.solves.counts, self._stopping = chosen.counts, dict(chosen.rules)
+                    own = chosen.ends if ends and chosen.ends and len(chosen.ends) == len(self.problem.goals) else None
+                    if own is None:
                         self.begin(chosen.fine or chosen.search, chosen.ends, chosen.rules)
-                        chosen = None
-                if chosen is None:
-                    front = work()
-                else:
-                    self._stopping = dict(chosen.rules)
-                    front = Front.of(chosen.ends.replace(solver=self._about, stats=self._stats()))
+                front = work() if own is None else Front.of(own.replace(solver=self._about, stats=self._stats()))
             except Stopped as reason:
                 self._stopped = str(reason)
                 return Front.of(no_points(self.problem.goals, self.problem, self._about, self._stats()))

@@ -217,14 +217,17 @@ class MultistartSolver:
         self._timed, (rows, columns) = True, objective_gradients(self.nlp).sparsity_out(0).get_triplet()
         for i in np.intersect1d(np.array(rows)[~np.isin(columns, times)], np.flatnonzero(self.convex)).tolist():
             z, failed = self._known.Z[0] if len(self._known) else self._starts.draw()[0], 0
-            for share in np.linspace(1.0, 0.0, MULTISTART.times + 1):
-                given = self._with_times(z, self.nlp.lower[times] + share * self.nlp.span[times])
-                with self.solves.at_most(MULTISTART.held):
-                    found = self.solves(self.nlp, given, Scalarised.single(i, m), held=times)
+            for given in np.linspace(self.nlp.upper[times], self.nlp.lower[times], MULTISTART.times + 1):
+                found = self._held(z, Scalarised.single(i, m), given)
                 failed = 0 if found.status == CONVERGED else failed + 1
                 if failed == MULTISTART.beneath or stopping():
                     break
                 z = z if failed else self._added(found).z
+
+    def _held(self, start: np.ndarray, task: Scalarised, times: np.ndarray) -> Solved:
+        """The result of a solve from a vector (n,) for given times (k,)."""
+        with self.solves.at_most(MULTISTART.held):
+            return self.solves(self.nlp, self._with_times(start, times), task, held=self.nlp.times)
 
     def _added(self, solved: Solved) -> Solved:
         """A result, which is known from now on if it converged."""
@@ -359,8 +362,7 @@ class MultistartSolver:
     def from_times(self, start: np.ndarray, task: Scalarised, times: np.ndarray) -> Solved:
         """The result of a solve that begins at the optimum for these times (k,), from a vector (n,): a linear-quadratic problem is convex
         for given times, and where these are free, too, its solves end at times where the optimum hardly depends on them."""
-        with self.solves.at_most(MULTISTART.held):
-            found = self.solves(self.nlp, self._with_times(start, times), task, held=self.nlp.times)
+        found = self._held(start, task, times)
         return self.from_vector(found.z, task, near=True) if found.status == CONVERGED else found
 
     def merits(self, task: Scalarised, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
