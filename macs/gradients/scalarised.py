@@ -75,10 +75,6 @@ class Scalarised:
         """Alpha at a result; None if that did not converge."""
         return float(self.alpha(solved.F)) if solved.status == CONVERGED else None
 
-    def after(self, F: np.ndarray) -> Scalarised:
-        """The same on the next mesh, after a result with F (m,)."""
-        return self
-
     def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
         """The result of gradient solves from a vector (n,), or near it only."""
         return solves(nlp, start, self, near)
@@ -182,10 +178,6 @@ class LexicographicEnd(Scalarised):
     def sharp(self) -> np.ndarray:
         """See `Scalarised.sharp`: where the front is steep, the others are determined by the root of an error of the first."""
         return self.moving
-
-    def after(self, F: np.ndarray) -> LexicographicEnd:
-        """See `Scalarised.after`."""
-        return replace(self, known=F)
 
     def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
         """See `Scalarised.solve`."""

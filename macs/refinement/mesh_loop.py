@@ -24,7 +24,7 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
-from ..gradients.scalarised import WORK, GradientSolves, Scalarised, Start, best_of
+from ..gradients.scalarised import WORK, GradientSolves, LexicographicEnd, Scalarised, Start, best_of
 from ..pareto.dominance import objective_units, stated_scales
 
 
@@ -242,7 +242,7 @@ class MeshLoop:
                     found.trouble = TROUBLES.get(status, f"on the next finer mesh its status is '{status}'")
                 break
             least = min(least, _achieved(reached, task))
-            present, task = reached, task.after(reached.F)
+            present, task = reached, replace(task, known=reached.F) if isinstance(task, LexicographicEnd) else task
             seen.append(present)
             if self.enough is not None and self.enough(present):
                 found.best = present
