@@ -20,6 +20,7 @@ from transcription.trajectories.limits import excursions
 from transcription.trajectories.simulate import limits_by_label
 
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
+from ..io.interrupts import spending
 from ..io.text import counted
 from ..pareto.archive import Archive
 from ..pareto.dominance import nondominated
@@ -70,6 +71,7 @@ def no_points(
     )
 
 
+@spending("certificates")
 def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray | None = None) -> dict[str, list[Any]]:
     """The columns `optimality` and `costates` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left
     when the work is to end.

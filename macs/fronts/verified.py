@@ -19,6 +19,7 @@ from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.blackbox import evaluated_again
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
+from ..io.interrupts import spending
 from ..io.text import counted
 from ..pareto.dominance import extremes, objective_units, stated_scales, varies
 from .points import Points
@@ -74,7 +75,9 @@ def simulated_independently(points: Points, simulate: Callable[[list[Trajectory]
     nothing = np.full(n, np.nan)
     found = Independent(np.full((n, m), np.nan), nothing, nothing.copy(), [""] * n, points.violations, {}, {}, np.zeros((n, m)))
     flown = {i: trajectory for i, trajectory in enumerate(points.trajectories) if trajectory is not None}
-    for i, simulation in zip(flown, simulate([*flown.values()]), strict=True):
+    with spending("simulation"):
+        simulations = simulate([*flown.values()])
+    for i, simulation in zip(flown, simulations, strict=True):
         found.worst[i], found.violation[i] = worst_violation(problem, simulation)
         found.defect[i], found.F[i] = simulation.max_defect, np.array(list(simulation.objectives.values())) * problem.signs
         found.sizes[i] = objective_sizes(problem, simulation.quantities, simulation.trajectory.parameters)
@@ -311,6 +314,7 @@ def largest_miss(problem: CompiledProblem, simulation: Simulation, F: np.ndarray
     return max(simulation.max_defect, worst_violation(problem, simulation)[1], float(np.where(np.isfinite(off), off, np.inf).max()))
 
 
+@spending("explanation")
 def _growing(problem: CompiledProblem, trajectory: Trajectory | None, tolerance: float) -> str:
     """A remark if each element by itself is right, so that small errors grow until the end: then no finer mesh can help."""
     assert trajectory is not None

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextvars import ContextVar
 from types import FrameType, TracebackType
 
 import numpy as np
@@ -15,7 +16,9 @@ from threadpoolctl import threadpool_limits
 
 from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_by
 
-__all__ = ["Interrupts", "Stopped", "work_on_trajectories"]
+__all__ = ["Interrupts", "Stopped", "spending", "spent_by", "work_on_trajectories"]
+
+_SPENT: ContextVar[dict[str, float] | None] = ContextVar("spent", default=None)
 
 TIME_LIMIT = "time limit"
 """Reason to end work that has taken as long as it may."""
@@ -84,6 +87,29 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         self._interrupted = True
         if self._whole is not None and not self._whole._interrupted:
             self._whole._interrupt(number, frame)
+
+
+@contextmanager
+def spending(what: str) -> Iterator[None]:
+    """A context, or decorator, whose seconds, without those of others within, are spent on this."""
+    spent, began = _SPENT.get(), time.perf_counter()
+    before = sum((spent or {}).values())
+    try:
+        yield
+    finally:
+        if spent is not None:
+            spent[what] = spent.get(what, 0.0) + time.perf_counter() - began - (sum(spent.values()) - before)
+
+
+@contextmanager
+def spent_by() -> Iterator[dict[str, float]]:
+    """A context whose result is what its seconds were spent on."""
+    spent: dict[str, float] = {}
+    token = _SPENT.set(spent)
+    try:
+        yield spent
+    finally:
+        _SPENT.reset(token)
 
 
 @contextmanager

@@ -27,6 +27,7 @@ from ..fronts.verified import Simulations, feasible_as_simulated, largest_miss, 
 from ..gradients.front_polish import KEPT_INSIDE, back_off
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal
 from ..io.console import working
+from ..io.interrupts import spending
 from ..pareto.dominance import extremes, separate
 from ..pareto.spread import Guide, spread
 from .front_refinement import FrontRefinement
@@ -54,6 +55,7 @@ MENDING = MendingLimits()
 AS_SIMULATED = "its objectives are those of its simulation, which its mesh does not give"
 
 
+@spending("mending")
 def mended(
     points: Points,
     verify: float,

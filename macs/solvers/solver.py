@@ -29,7 +29,7 @@ from ..fronts.builders import from_archive, from_vector_problem, no_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine
-from ..io.interrupts import TIME_LIMIT, Interrupts, work_on_trajectories
+from ..io.interrupts import TIME_LIMIT, Interrupts, spending, spent_by, work_on_trajectories
 from ..refinement.mesh_search import SearchMeshes, search_meshes
 from .method import SearchMethod
 from .progress import Progress
@@ -131,6 +131,8 @@ class Solver(SearchMethod):
 
         Notes
         -----
+        After more than ten seconds, `stats["seconds"]` has what they were spent on: search, certificates, mending, simulation, explanation.
+
         Without a number of evaluations, MACS searches in rounds, each with a polish if there are gradients and something new was found. It
         ends when further work did not improve the front: 150 evaluations (2000 without gradients); where starts led to different optima,
         or a later round improved the front, twice as many, at least a quarter of those before the last improvement, and some seconds of
@@ -160,7 +162,11 @@ class Solver(SearchMethod):
             return self._solve_vector(problem.compile(), start, verify, call)
         if isinstance(problem, Problem):
             inner, start = problem.default_inner if inner is None else inner, problem.default_start if start is None else start
-        return self._solve(problem, transcription, "auto" if inner is None else inner, start, verify, call)
+        with spent_by() as seconds, spending("search"):
+            front = self._solve(problem, transcription, "auto" if inner is None else inner, start, verify, call)
+        if sum(seconds.values()) <= 10.0:  # of a short run they say little
+            return front
+        return front.replace(stats=front.stats | {"seconds": {what: round(one, 2) for what, one in seconds.items()}})
 
     def _solve(
         self,

@@ -1,5 +1,7 @@
 """Points that a simulation does not confirm are solved again; the ascent's least time has a closed form."""
 
+from types import SimpleNamespace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -30,6 +32,23 @@ def marked() -> Front:
 @pytest.fixture(scope="module")
 def mended(marked) -> Front:
     return marked.mended()
+
+
+def test_the_widest_gap_is_between_neighbours_whatever_the_number_of_objectives() -> None:
+    F = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    good = SimpleNamespace(simulated_F=F, F=F, verified=np.ones(3, dtype=bool))
+    first = mending._target(good, np.empty((0, 3)), np.ones(3), None)  # type: ignore[arg-type]
+    assert first.tolist() == [0.0, 1.0, 0.5] or first.tolist() == [0.5, 1.0, 0.0]
+    second = mending._target(good, first[None], np.ones(3), None)  # type: ignore[arg-type]
+    assert second.tolist() == [0.5, 0.0, 0.5]
+    assert mending._target(good, np.array([first, second]), np.ones(3), None) is None  # type: ignore[arg-type]
+
+
+def test_a_search_with_few_points_gets_more_in_their_gaps(unverified) -> None:
+    few = unverified[[0, len(unverified) - 1]]
+    more = mending.mended(few, 1e-3, size=5)
+    assert len(more) == 5 and more.verified.all()
+    assert np.diff(more.F[:, 0]).max() < 0.5 * np.ptp(more.F[:, 0])
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import gc
 from itertools import pairwise
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -12,7 +13,7 @@ from smooth_problems import time_against_effort
 
 from macs import MACS, NSGA2, optimize, payoff
 from macs.gradients.scalarised import GradientSolves, Scalarised
-from macs.refinement.mesh_loop import LOOP, MeshLoop, Programs
+from macs.refinement.mesh_loop import LOOP, MeshLoop, OnMesh, Programs
 from macs.refinement.mesh_search import (
     COARSE,
     SEARCH,
@@ -364,3 +365,13 @@ def test_a_guess_that_turns_often_needs_more_elements(periods, elements):
     assert guessed_elements(problem.compile()) == SEARCH.guessed[0]
     phase.guess(x=(times, np.sin(2 * np.pi * periods * times)))
     assert guessed_elements(problem.compile()) == elements
+
+
+def test_what_no_other_mesh_confirms_is_better_than_what_a_simulation_refutes() -> None:
+    wanted = Wanted(1e-3, feasible=1e-3, objectives=1e-3)
+
+    def error(change: float, excess: float) -> float:
+        verdict = SimpleNamespace(wanted=wanted, error=excess, gain=0.0)
+        return OnMesh(None, None, None, None, verdict, True, None, change=change).error  # type: ignore[arg-type]
+
+    assert 1.0 < error(0.5e-3, 2.0) < error(np.inf, 1.0) < error(0.5e-3, 500.0)

@@ -86,7 +86,7 @@ def test_a_callback_sees_progress_and_stops_the_search() -> None:
 def test_a_time_limit_keeps_what_was_found() -> None:
     front = MACS().solve(compiled("orbit_rise"), MESH, evaluations=10**6, seed=1, time_limit=0.5)
     assert front.stats["stopped"] == "time limit" and not front.stats["reproducible"]
-    assert len(front) > 0
+    assert len(front) > 0 and front.was_simulated.all()
     front = MACS().solve(compiled("goddard"), MESH, evaluations=12, seed=1, inner=Ipopt(seconds=1e-6))
     assert not front.stats["reproducible"]
 
