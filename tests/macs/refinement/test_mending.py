@@ -45,7 +45,8 @@ def test_the_widest_gap_is_between_neighbours_whatever_the_number_of_objectives(
 
 
 def test_a_search_with_few_points_gets_more_in_their_gaps(unverified) -> None:
-    few = unverified[[0, len(unverified) - 1]]
+    few = unverified.verify(1e-3)
+    few = few[np.flatnonzero(few.verified)[[0, -1]]]
     more = mending.mended(few, 1e-3, size=5)
     assert len(more) == 5 and more.verified.all()
     assert np.diff(more.F[:, 0]).max() < 0.5 * np.ptp(more.F[:, 0])
