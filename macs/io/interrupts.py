@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_by
 
-__all__ = ["Interrupts", "Stopped", "spending", "spent_by", "work_on_trajectories"]
+__all__ = ["Interrupts", "Stopped", "spending", "work_on_trajectories"]
 
 _SPENT: ContextVar[dict[str, float] | None] = ContextVar("spent", default=None)
 
@@ -90,25 +90,15 @@ class Interrupts(AbstractContextManager["Interrupts"]):
 
 
 @contextmanager
-def spending(what: str) -> Iterator[None]:
-    """A context, or decorator, whose seconds, without those of others within, are spent on this."""
-    spent, began = _SPENT.get(), time.perf_counter()
-    before = sum((spent or {}).values())
-    try:
-        yield
-    finally:
-        if spent is not None:
-            spent[what] = spent.get(what, 0.0) + time.perf_counter() - began - (sum(spent.values()) - before)
-
-
-@contextmanager
-def spent_by() -> Iterator[dict[str, float]]:
-    """A context whose result is what its seconds were spent on."""
-    spent: dict[str, float] = {}
-    token = _SPENT.set(spent)
+def spending(what: str) -> Iterator[dict[str, float]]:
+    """A context, or decorator, whose seconds, without those of others within, are spent on this; with all that is within the outermost."""
+    known = _SPENT.get()
+    spent = {} if known is None else known
+    token, before, began = _SPENT.set(spent), sum(spent.values()), time.perf_counter()
     try:
         yield spent
     finally:
+        spent[what] = spent.get(what, 0.0) + time.perf_counter() - began - (sum(spent.values()) - before)
         _SPENT.reset(token)
 
 

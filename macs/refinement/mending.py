@@ -183,16 +183,10 @@ class _Mending:
         most = self._solves.counts.work + self._most_work(points, size - int(points.verified.sum()))
         tried = np.empty((0, points.F.shape[1]))
         fruitless = 0
-        while (
-            points.verified.any()
-            and _needed(points).sum() < size
-            and fruitless < LOOP.patience
-            and self._solves.counts.work < most
-            and not stopping()
-        ):
+        while points.verified.any() and _needed(points).sum() < size and fruitless < LOOP.patience:
             scales = objective_scales(points)
             target = _target(points, tried, scales, guide)
-            if target is None:
+            if target is None or self._solves.counts.work >= most or stopping():
                 break
             tried = np.vstack([tried, target])
             rows = np.flatnonzero(points.verified)

@@ -29,7 +29,7 @@ from ..fronts.builders import from_archive, from_vector_problem, no_points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine
-from ..io.interrupts import TIME_LIMIT, Interrupts, spending, spent_by, work_on_trajectories
+from ..io.interrupts import TIME_LIMIT, Interrupts, spending, work_on_trajectories
 from ..refinement.mesh_search import SearchMeshes, search_meshes
 from .method import SearchMethod
 from .progress import Progress
@@ -162,7 +162,7 @@ class Solver(SearchMethod):
             return self._solve_vector(problem.compile(), start, verify, call)
         if isinstance(problem, Problem):
             inner, start = problem.default_inner if inner is None else inner, problem.default_start if start is None else start
-        with spent_by() as seconds, spending("search"):
+        with spending("search") as seconds:
             front = self._solve(problem, transcription, "auto" if inner is None else inner, start, verify, call)
         if sum(seconds.values()) <= 10.0:  # of a short run they say little
             return front
