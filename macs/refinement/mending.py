@@ -183,7 +183,7 @@ class _Mending:
         most = self._solves.counts.work + self._most_work(points, size - int(points.verified.sum()))
         tried = np.empty((0, points.F.shape[1]))
         fruitless = 0
-        while points.verified.any() and _needed(points).sum() < size and fruitless < LOOP.patience:
+        while 0 < points.verified.sum() < size and fruitless < LOOP.patience:
             scales = objective_scales(points)
             target = _target(points, tried, scales, guide)
             if target is None or self._solves.counts.work >= most or stopping():
@@ -327,13 +327,13 @@ def _judged(points: Points) -> dict[str, np.ndarray]:
 
 
 def _within(points: Points, size: int, guide: Guide | None) -> np.ndarray:
-    """Rows (k,) of a front with `size` points, if that is possible without the best of any objective: of verified points those that are
-    well spread, of others as many as there is room for."""
+    """Rows (k,) of a front with `size` points: of verified points those that are well spread, of others as many as there is room for, first
+    the best of an objective."""
     good = np.flatnonzero(points.verified)
     if len(good) > size:
         return good[spread(points.simulated_F[good], size, guide=guide)]
-    spare = np.flatnonzero(~_needed(points))
-    return np.setdiff1d(np.arange(len(points)), spare[: max(len(points) - size, 0)])
+    others = np.flatnonzero(~points.verified)
+    return np.sort(np.r_[good, others[np.argsort(~_needed(points)[others], kind="stable")][: size - len(good)]])
 
 
 def _needed(points: Points) -> np.ndarray:

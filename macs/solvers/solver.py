@@ -136,8 +136,8 @@ class Solver(SearchMethod):
         Without a number of evaluations, MACS searches in rounds, each with a polish if there are gradients and something new was found. It
         ends when further work did not improve the front: 150 evaluations (2000 without gradients); where starts led to different optima,
         or a later round improved the front, twice as many, at least a quarter of those before the last improvement, and some seconds of
-        counted work. Later rounds begin with gradient solves from other starts. At its `ceiling` a search ends, too; `stats["stopped"]`
-        is "done" or "ceiling".
+        counted work. Later rounds begin with gradient solves from other starts. At its `ceiling` a search ends, too, and after half a
+        minute or so of counted work on large programs; `stats["stopped"]` is "done" or "ceiling".
         Improved means: points that lie beyond the front by more than 0.001 of its ranges add 0.1 % to its hypervolume, or to the best
         values of all directions on average, or one objective gets better by 0.5 % of its range. That is no proof that nothing better
         exists: what no round has come near is not found.
