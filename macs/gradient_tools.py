@@ -222,7 +222,7 @@ def sweep(
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     job = _Job("sweep", problem, transcription, terms, points=int(points), method=method)
     check_points(points, len(job.problem.goals))
-    return job.run(lambda: job.swept(points, method), mended)
+    return job.run(lambda: job.swept(points, method), lambda front, verify: mended(front, verify, ends=job.ends))
 
 
 def check_starts(name: str, starts: int | str) -> None:
@@ -278,6 +278,7 @@ class _Job:
         self._about = {"name": name, "settings": {**settings, **terms.settings}}
         self._stopped = ""
         self._sole: np.ndarray | None = None
+        self.ends: Points | None = None  # those by which the mesh was found, on their own meshes
         self._stopping: dict[int, MultistartStopping] = {}
         self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
         self._began = time.perf_counter()
@@ -311,8 +312,9 @@ class _Job:
                 own = None
                 if not self.fixed:
                     given, count = partial(beginning, self._terms.start), self._terms.count
-                    chosen = search_meshes(self._statement, verify or VERIFY, self.solves.tolerance, show, given, count, knots=ends)
+                    chosen = search_meshes(self._statement, verify or VERIFY, self.solves.tolerance, show, given, count)
                     self.solves.counts, self._stopping = chosen.counts, dict(chosen.rules)
+                    self.ends = chosen.ends
                     own = chosen.ends if ends and chosen.ends and len(chosen.ends) == len(self.problem.goals) else None
                     if own is None:
                         self.begin(chosen.fine or chosen.search, chosen.ends, chosen.rules)

@@ -376,8 +376,9 @@ class MultistartSolver:
         return np.where(np.isfinite(merit), merit, np.inf)
 
     def nearest(self, task: Scalarised) -> np.ndarray | None:
-        """The known vector (n,) with the best merit; None if none is known."""
-        return self._known.Z[np.argmin(self.merits(task, self._known.F, self._known.violation))] if len(self._known) else None
+        """The known vector (n,) with the best merit, a feasible one where optima for given times are known; None if none is known."""
+        merits = self.merits(task, self._known.F, self._known.violation, strict=len(self._known) > self._given and self._timed)
+        return self._known.Z[np.argmin(merits)] if len(self._known) else None
 
     def rival(self, solved: Solved, task: Scalarised) -> np.ndarray | None:
         """A known vector (n,) that is clearly better for a problem than its own result; None if there is none."""

@@ -154,7 +154,6 @@ class MeshLoop:
     wanted: Wanted
     limit: int  # most meshes of a point
     most_work: float = np.inf  # iterations times variables
-    knots: bool = True  # whether edges of elements may move to where controls switch
     enough: Callable[[OnMesh], bool] | None = None  # when a point is good, whatever else might be better
     more: bool = True  # whether meshes get finer; otherwise elements move only
 
@@ -223,7 +222,7 @@ class MeshLoop:
         least = _achieved(begun, task)
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
-            for proposal in self._proposals(present, waiting, self.knots and detours > 0):
+            for proposal in self._proposals(present, waiting, detours > 0):
                 try:
                     reached, last = self._solved(proposal, present, task, others, least)
                 except Stopped:

@@ -403,10 +403,9 @@ def search_meshes(
     show: Callable[[str], None] = lambda words: None,
     given: Callable[[NLP], np.ndarray | None] | None = None,
     starts: int | None = None,
-    knots: bool = False,
 ) -> SearchMeshes:
     """The problem's own default transcription; without one, those found from the ends of the front, which are sought on coarse meshes and
-    then on finer ones, until a simulation agrees and a finer mesh changes nothing; with `knots`, on edges at switches, too."""
+    then on finer ones, until a simulation agrees and a finer mesh changes nothing."""
     problem = statement.compile()
     if isinstance(statement, Problem) and statement.default_transcription is not None:
         return SearchMeshes(stated(statement.default_transcription), None, Counts())
@@ -415,7 +414,7 @@ def search_meshes(
     show("ends of the front on coarse meshes")
     limits, m = SEARCH.ends * verify, len(problem.goals)
     wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
-    loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, m * WORK.most, knots=knots)
+    loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, m * WORK.most)
     tasks = [Scalarised.single(i, m) for i in range(m)]
     search = MeshSearch(loop, tasks, given or guessed_start, starts, np.random.default_rng(0), ends=True)
     search.go(coarse_meshes(statement))
@@ -438,7 +437,7 @@ def _chosen(search: MeshSearch, limits: float) -> SearchMeshes:
     if same:
         Z = np.array([one.solved.z for one, _ in refined])
         same = bool(verified(from_vectors(search.solvers[method].nlp, Z, {}, stats, sort=False), limits).verified.all())
-    fine = method if same else _common([point.method for _, point in refined], loop.problem)
+    fine = method if same else _common([point.method.settled(point.trajectory) for _, point in refined], loop.problem)
     rules = {i: one.rule for i, one in enumerate(best) if one.refinement is not None}
     ends = Points.concatenate(rows).replace(stats=stats)
     return SearchMeshes(method, None if fine == method else fine, loop.solves.counts, ends, rules)

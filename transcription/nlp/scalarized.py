@@ -17,6 +17,7 @@ import numpy as np
 
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import Stopped, stopping
+from .derivatives import convex_objectives
 from .optimality import optimality
 from .program import (
     STATUS_OF_IPOPT,
@@ -194,8 +195,9 @@ def scalarize(
     feasible = margin is None and violation[0] <= tolerance and task.excess(F[0]) <= tolerance
     drawn, several = not (persistent or feasible or near), np.count_nonzero(task.used) > 1
     # Scaling by MUMPS takes some per cent of an iteration. Where limits of objectives leave nothing strictly inside, from feasible starts
-    # for several objectives, and from starts that are drawn, iterations without may take many times as long: 30 times on the skip entry.
-    scaled = task.limited or drawn or (feasible and several)
+    # for several objectives, from starts that are drawn, and where all but times is linear, so that optima lie in corners, iterations
+    # without may take many times as long: 30 times on the skip entry, 100 times on a row of masses.
+    scaled = task.limited or drawn or (feasible and several) or convex_objectives(nlp).any()
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled), np.array(held, dtype=int))
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
