@@ -197,7 +197,7 @@ def scalarize(
     # Scaling by MUMPS takes some per cent of an iteration. Where limits of objectives leave nothing strictly inside, from feasible starts
     # for several objectives, from starts that are drawn, and where all but times is linear, so that optima lie in corners, iterations
     # without may take many times as long: 30 times on the skip entry, 100 times on a row of masses.
-    scaled = task.limited or drawn or (feasible and several) or convex_objectives(nlp).any()
+    scaled = task.limited or drawn or (feasible and several) or convex_objectives(nlp).all()
     settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled), np.array(held, dtype=int))
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
