@@ -311,8 +311,9 @@ class _Job:
             try:
                 own = None
                 if not self.fixed:
-                    given, count = partial(beginning, self._terms.start), self._terms.count
-                    chosen = search_meshes(self._statement, verify or VERIFY, self.solves.tolerance, show, given, count)
+                    given, part = partial(beginning, self._terms.start), SEARCH.optimum if ends else SEARCH.ends
+                    told = verify or VERIFY, self.solves.tolerance, show, given, self._terms.count
+                    chosen = search_meshes(self._statement, *told, part)
                     self.solves.counts, self._stopping = chosen.counts, dict(chosen.rules)
                     self.ends = chosen.ends
                     own = chosen.ends if ends and chosen.ends and len(chosen.ends) == len(self.problem.goals) else None

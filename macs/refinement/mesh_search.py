@@ -403,16 +403,17 @@ def search_meshes(
     show: Callable[[str], None] = lambda words: None,
     given: Callable[[NLP], np.ndarray | None] | None = None,
     starts: int | None = None,
+    part: float = SEARCH.ends,
 ) -> SearchMeshes:
     """The problem's own default transcription; without one, those found from the ends of the front, which are sought on coarse meshes and
-    then on finer ones, until a simulation agrees and a finer mesh changes nothing."""
+    then on finer ones, until a simulation agrees and a finer mesh changes no more than this part of what points may miss."""
     problem = statement.compile()
     if isinstance(statement, Problem) and statement.default_transcription is not None:
         return SearchMeshes(stated(statement.default_transcription), None, Counts())
     if not differentiable(problem):
         return SearchMeshes(COARSE[0], None, Counts())
     show("ends of the front on coarse meshes")
-    limits, m = SEARCH.ends * verify, len(problem.goals)
+    limits, m = part * verify, len(problem.goals)
     wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
     loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, m * WORK.most)
     tasks = [Scalarised.single(i, m) for i in range(m)]
