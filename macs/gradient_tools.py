@@ -222,7 +222,7 @@ def sweep(
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
     job = _Job("sweep", problem, transcription, terms, points=int(points), method=method)
     check_points(points, len(job.problem.goals))
-    return job.run(lambda: job.swept(points, method), lambda front, verify: mended(front, verify, ends=job.ends))
+    return job.run(lambda: job.swept(points, method), lambda front, verify: mended(front, verify, ends=job.ends, size=points))
 
 
 def check_starts(name: str, starts: int | str) -> None:

@@ -246,7 +246,11 @@ class MeshLoop:
             if self.enough is not None and self.enough(present):
                 found.best = present
                 break
-            found.best = min((found.best, present), key=lambda one: self._rank(one, task, least))
+            # Errors of a first mesh that no other has confirmed say less than changes on finer ones, but more than what is clearly refuted.
+            found.best = min(
+                (found.best, present),
+                key=lambda one: (one.verdict.error > 10.0, self.wanted.confirmed and np.isinf(one.change), *self._rank(one, task, least)),
+            )
             history.append(self._rank(present, task, least)[1])
             if self.enough is None and not self._rank(present, task, least)[0]:
                 break
