@@ -18,6 +18,7 @@ from .baselines import AGEMOEA2, CTAEA, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVE
 from .evaluation.evaluator import Evaluation, Evaluator
 from .front import Front
 from .fronts.point import Point
+from .fronts.tables import explain
 from .gradient_tools import optimize, payoff, sweep
 from .search.macs import MACS
 from .solvers.progress import Progress
@@ -40,6 +41,7 @@ __all__ = [
     "Point",
     "Progress",
     "Solver",
+    "explain",
     "optimize",
     "payoff",
     "sweep",

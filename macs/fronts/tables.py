@@ -171,7 +171,7 @@ def footer(front: Points) -> list[str]:
     lines = _simulated(front) if front.was_simulated.all() else _not_simulated(front) if front.dynamic else []
     seconds = sorted(front.stats.get("seconds", {}).items(), key=lambda one: -one[1])
     lines += ["Time: " + ", ".join(f"{what} {amount:.1f} s" for what, amount in seconds) + "."] if seconds else []
-    lines += [*_unresolved(front), *_without_conflict(front)]
+    lines += [*_unresolved(front, front), *_without_conflict(front)]
     bad = int((front.status != CONVERGED).sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
@@ -200,7 +200,47 @@ def _by_inner_solver(name: str, evaluations: int, feasible: int | None = None, w
     return f"{counted(evaluations, 'candidate')} {was} {how}{known}."
 
 
-def _unresolved(front: Points) -> list[str]:
+def explain(point: Point) -> str:
+    """What is known of how far a point can be trusted, and why it is not verified, a sentence a line.
+
+    The first line is its number and objectives. Then follow whether it converged, and the constraint that it violates most if it did not;
+    whether it is verified, and what its simulation misses, where, and what to do about it; the remarks of the table of its front on this
+    point; and whether its Hamiltonian shows that its mesh does not resolve the optimum.
+
+    Parameters
+    ----------
+    point : Point
+        Of any front, from a search, a gradient tool, or a file. Nothing is simulated: `Front.verify` does that.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> from macs import explain, optimize
+    >>> from problems import load
+    >>> point = optimize(load("goddard"), objective="horizontal speed", starts=1)
+    >>> print(explain(point).split(": ", 1)[1].splitlines()[1])
+    It is verified: what a simulation gives differs by no more than its tolerances.
+    """
+    lines = [f"Point {point.index}: {point.title}."]
+    if point.status != CONVERGED:
+        worst = max(point.violations, key=lambda name: point.violations[name], default="")
+        most = f"; most violated is {worst}, by {point.violations[worst]:.1e} of its scale" if worst else ""
+        lines.append(f"Its status is '{point.status}'{most}.")
+    vector = point.source is not None and point.source.vector
+    how = "another evaluation" if vector else "a simulation"
+    told = {
+        True: f"It is verified: what {how} gives differs by no more than its tolerances.",
+        False: f"It is not verified: {how} does not confirm it.",
+        None: "It was not simulated: Front.verify does that." if point.dynamic or vector else "There is nothing to verify of a black box.",
+    }
+    lines += [told[point.verified], *(f"{part[:1].upper()}{part[1:]}." for part in point.note.split("; ") if part)]
+    return "\n".join([*lines, *_unresolved(point._points, [point])])
+
+
+def _unresolved(front: Points, points: Iterable[Point]) -> list[str]:
     """On the meshes of which points, that miss nothing, the Hamiltonian shows that these are no optima but of their meshes.
 
     Only of DFET: at nodes of collocation beside a switch it varies where a mesh is exact.
@@ -208,7 +248,7 @@ def _unresolved(front: Points) -> list[str]:
     if not isinstance(front.problem, CompiledProblem):
         return []
     found = {}
-    for point in front:
+    for point in points:
         method = Transcription.registered.get((point.transcription or {}).get("method", ""), Transcription)
         if point.costates is None or point.trajectory is None or point.verified is False or not issubclass(method, DFET):
             continue

@@ -15,6 +15,7 @@ from transcription.stopping import Stopped
 from transcription.trajectories.jumps import UNTRUSTED
 from transcription.trajectories.limits import excess
 from transcription.trajectories.simulate import Simulation, defect_of_elements, simulate_all, worst_violation
+from transcription.trajectories.tables import rough_tables
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.blackbox import evaluated_again
@@ -175,8 +176,9 @@ def _allowed(points: Points, tolerance: float) -> float:
 
 def _misses(points: Points, i: int, found: Independent, off: np.ndarray, tolerance: float, allowed: float, remark: bool) -> list[str]:
     """In words, what point i misses by more than the tolerance."""
+    rough = _rough(points.compiled(), points.trajectories[i]) if points.dynamic and remark else []
     if points.dynamic and not np.isfinite(found.defect[i]):
-        return [found.diverged[i]]
+        return [found.diverged[i], *rough]
     if not points.dynamic and not np.isfinite(found.F[i]).all():
         return ["it fails"]
     reasons = []
@@ -188,7 +190,15 @@ def _misses(points: Points, i: int, found: Independent, off: np.ndarray, toleran
     if not off.max() <= 1.0:
         k = int(np.where(np.isfinite(off), off, -1.0).argmax())
         reasons.append(f"its '{points.names[k]}' differs by {abs(found.F[i, k] - points.F[i, k]):.2g} {points.goals[k].unit}".rstrip())
-    return [*reasons, *([found.jumps[i]] if i in found.jumps else [])]
+    return [*reasons, *rough, *([found.jumps[i]] if i in found.jumps else [])]
+
+
+@spending("explanation")
+def _rough(problem: CompiledProblem, trajectory: Trajectory | None) -> list[str]:
+    """The first table that the mesh of a trajectory cannot follow, if there is any."""
+    assert trajectory is not None
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    return [str(one) for phase in problem.phases for one in rough_tables(phase, trajectory[phase.name], parameters)][:1]
 
 
 def feasible_as_simulated(points: Points, tolerance: float) -> np.ndarray:
