@@ -192,7 +192,7 @@ class MultistartSolver:
         self.nlp, self.starts, self.solves, self.rng = nlp, starts, solves, rng
         self.stopping, self.most, self._unseen = dict[int, MultistartStopping](), most, unseen
         self.closest: Solved | None = None  # what violates least, where nothing is feasible
-        self._timed = False  # whether optima for given times were sought
+        self._timed, self._uneven = False, list[int]()  # whether optima for given times were sought, and whose do not fall with time
         self._starts = Starts(nlp, rng)
         Z = np.empty((0, len(nlp.variables))) if given is None else given
         self._given = len(Z)
@@ -205,8 +205,8 @@ class MultistartSolver:
 
     @property
     def convex(self) -> np.ndarray:
-        """Which objectives (m,) have one optimum for each time: no start finds another than what is best for some time."""
-        return convex_objectives(self.nlp)
+        """Which objectives (m,) have one optimum for each time, and do not get worse with time: no start finds a better one."""
+        return convex_objectives(self.nlp) & ~np.isin(np.arange(len(self.nlp.problem.goals)), self._uneven)
 
     def _over_times(self) -> None:
         """Once, where there is a free time: add to what is known the optima for given times, from the longest on, each from the one before,
@@ -216,13 +216,15 @@ class MultistartSolver:
             return
         self._timed, (rows, columns) = True, objective_gradients(self.nlp).sparsity_out(0).get_triplet()
         for i in np.intersect1d(np.array(rows)[~np.isin(columns, times)], np.flatnonzero(self.convex)).tolist():
-            z, failed = self._known.Z[0] if len(self._known) else self._starts.draw()[0], 0
+            z, failed, least = self._known.Z[0] if len(self._known) else self._starts.draw()[0], 0, -np.inf
             for given in np.linspace(self.nlp.upper[times], self.nlp.lower[times], MULTISTART.held[1] + 1):
                 found = self._held(z, Scalarised.single(i, m), given)
                 failed = 0 if found.status == CONVERGED else failed + 1
                 if failed == MULTISTART.held[2] or stopping():
                     break
-                z = z if failed else self._added(found).z
+                if not failed:
+                    self._uneven += [i] if found.F[i] < least - MULTISTART.rounding * abs(least) else []
+                    z, least = self._added(found).z, found.F[i]
 
     def _held(self, start: np.ndarray, task: Scalarised, times: np.ndarray) -> Solved:
         """The result of a solve from a vector (n,) for given times (k,)."""

@@ -172,11 +172,11 @@ def restart_solves(
 
 def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) -> None:
     """Make the gradient solves from other starts at the beginning of a round, where the search chooses its inner solver."""
-    rounds = state.rounds
-    if rounds is None or not (settings.refines and evaluator.has_gradients and evaluator.ways and len(state.archive)):
+    rounds = state.rounds if evaluator.has_gradients else None
+    if rounds is None or not (settings.refines and isinstance(evaluator, Bilevel) and evaluator.ways and len(state.archive)):
         return
-    if (count := rounds.due - rounds.restarts) > 0 and isinstance(evaluator, Bilevel) and not convex_objectives(evaluator.nlp).all():
-        memory = state.gradients
+    memory = state.gradients
+    if (count := rounds.due - rounds.restarts) > 0 and not (memory.unimodal.all() and convex_objectives(evaluator.nlp).all()):
         solved, worse = restart_solves(state.archive, evaluator, settings.archive, count, rounds.restarts, memory.unimodal, state.rng)
         memory.multimodal, rounds.restarts = memory.multimodal or worse, rounds.due
         state.add_optima(Archive.of(solved, solved.status == CONVERGED))

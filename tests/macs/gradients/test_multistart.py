@@ -126,6 +126,18 @@ def test_optima_for_several_times_take_the_place_of_other_starts():
     assert front.objectives[:, 1].min() == pytest.approx(longest.objectives["effort"], rel=1e-6)
 
 
+def test_where_the_least_for_a_time_does_not_fall_with_it_other_starts_are_made():
+    """To be at a place in mid-swing: it takes no effort each time an oscillator comes by, and more in between."""
+    problem = Problem("catch")
+    phase = problem.phase("phase", t0=0.0, tf=(1.0, 20.0))
+    x, v = phase.state("x", bounds=(-5, 5), initial=1, final=0), phase.state("v", bounds=(-5, 5), initial=0, final=1)
+    u = phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=v, v=u - 4 * x)
+    problem.minimize("effort", phase.integral(u**2))
+    point = optimize(problem, DFET(20, 3), seed=1)
+    assert point.alone().stats["starts"] > 1 and point.alone().stats["optima"] > 1
+
+
 @pytest.mark.slow
 @given(st.lists(st.sampled_from([1.0, 2.0, 5.0, None]), min_size=1, max_size=40), st.floats(-8e-6, 8e-6))
 def test_counts_of_starts(losses, noise):
