@@ -46,6 +46,7 @@ SLOW = (
     "docs/vector-problems.md",
     "docs/verification.md",
     "docs/extending/problem.md",
+    "docs/stating/data.md",
     "docs/stating/guesses.md",
     "docs/stating/limits.md",
     "docs/stating/objectives.md",
