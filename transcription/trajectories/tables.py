@@ -45,8 +45,8 @@ class Rough:
         other = f", or make '{self.state}' the independent variable, so that elements can end at values of the table" if self.grows else ""
         return (
             f"its mesh does not follow table '{self.table}' of {of}, which goes up and down {self.turns} times along phase '{self.phase}', "
-            f"{when}: smooth it, at even places, by a Gaussian of deviation {width} (it then differs by at most {100 * self.change:.2g} % of its "
-            f"range){other}"
+            f"{when}: smooth it, at even places, by a Gaussian of deviation {width} (it then differs by at most "
+            f"{100 * self.change:.2g} % of its range){other}"
         )
 
 
