@@ -197,8 +197,7 @@ def _misses(points: Points, i: int, found: Independent, off: np.ndarray, toleran
 def _rough(problem: CompiledProblem, trajectory: Trajectory | None) -> list[str]:
     """The first table that the mesh of a trajectory cannot follow, if there is any."""
     assert trajectory is not None
-    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
-    return [str(one) for phase in problem.phases for one in rough_tables(phase, trajectory[phase.name], parameters)][:1]
+    return [str(one) for one in rough_tables(problem, trajectory)[:1]]
 
 
 def feasible_as_simulated(points: Points, tolerance: float) -> np.ndarray:

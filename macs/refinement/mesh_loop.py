@@ -21,6 +21,7 @@ from transcription.meshes.refinement import next_method, redistributed, where_co
 from transcription.meshes.verdict import Verdict, Wanted, judge, simulated_objectives
 from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
+from transcription.trajectories.tables import rough_tables
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
@@ -220,6 +221,8 @@ class MeshLoop:
         found, seen = Refinement(begun), [begun]
         present, history, waiting, detours = begun, [begun.verdict.error], list(hints), LOOP.detours
         least = _achieved(begun, task)
+        # Where a table is noisy, finer meshes see more of the noise.
+        patience = 1 if rough_tables(self.problem, begun.trajectory) else LOOP.patience
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
             for proposal in self._proposals(present, waiting, detours > 0):
@@ -246,15 +249,11 @@ class MeshLoop:
             if self.enough is not None and self.enough(present):
                 found.best = present
                 break
-            # Errors of a first mesh that no other has confirmed say less than changes on finer ones, but more than what is clearly refuted.
-            found.best = min(
-                (found.best, present),
-                key=lambda one: (one.verdict.error > 10.0, self.wanted.confirmed and np.isinf(one.change), *self._rank(one, task, least)),
-            )
+            found.best = min((found.best, present), key=lambda one: (*self._doubts(one), *self._rank(one, task, least)))
             history.append(self._rank(present, task, least)[1])
             if self.enough is None and not self._rank(present, task, least)[0]:
                 break
-            if len(history) > LOOP.patience and min(history[-LOOP.patience :]) > LOOP.progress * min(history[: -LOOP.patience]):
+            if len(history) > patience and min(history[-patience:]) > LOOP.progress * min(history[:-patience]):
                 found.trouble = TROUBLES[CONVERGED]
                 break
         if self.enough is None and not self._rank(found.best, task, least)[0]:
@@ -272,6 +271,11 @@ class MeshLoop:
         an error of the objectives."""
         beyond = (task.loss(one.F) - least) / self.wanted.settled if self.wanted.confirmed else 0.0
         return bool(one.complaints()) or beyond > 1.0, max(one.error, beyond)
+
+    def _doubts(self, one: OnMesh) -> tuple[bool, bool]:
+        """Whether a simulation clearly refutes a point, or refutes one that no other mesh confirms; and whether none confirms it."""
+        unsure = self.wanted.confirmed and bool(np.isinf(one.change))
+        return bool(one.verdict.complaints()) if unsure else one.verdict.error > 10.0, unsure
 
     def _improves(self, reached: OnMesh, present: OnMesh, task: Scalarised, least: float) -> bool:
         """Whether to continue on a mesh with knots, or of another point: its errors are not larger, and its optimum is no worse than the

@@ -33,7 +33,7 @@ def rough(problem):
     nlp = DFET(6, 5).transcribe(compiled)
     trajectory = nlp.unpack(nlp.first_guess(0.5 * (nlp.lower + nlp.upper)[nlp.free][None])[0])
     assert trajectory["ride"]["x"] == pytest.approx(100 * trajectory["ride"].time / trajectory["ride"].tf, abs=1e-6)
-    return rough_tables(compiled.phases[0], trajectory["ride"], np.empty(0))
+    return rough_tables(compiled, trajectory)
 
 
 @pytest.mark.parametrize("kind", ["linear", "bspline"])

@@ -254,7 +254,7 @@ def _transitions(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: 
     """Derivatives (N, nx, nx) of the states at the ends of the elements by those at their beginnings, in scales."""
     elements, nx = len(trajectory.state.coefficients), len(phase.states)
     scales, nothing = state_scales(trajectory), np.zeros((elements * (nx + 1), phase.integrands.size1_out(0)))
-    rtol, step = 1e-11, 1e-6  # a state is changed, in scales, by about the root of what the integrator resolves
+    rtol, step = 1e-9, 1e-5  # a state is changed, in scales, by what the integrator resolves to four digits
     changed = np.vstack([np.zeros(nx), step * np.diag(scales)])
     starts = (trajectory.edge_states[:-1, None] + changed).reshape(-1, nx)
     arcs = Arcs.of(phase, [(trajectory, j, parameters) for j in range(elements) for _ in range(nx + 1)])

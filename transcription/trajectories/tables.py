@@ -8,12 +8,12 @@ import casadi as ca
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from problems.compiled import CompiledPhase, remembered
+from problems.compiled import CompiledPhase, CompiledProblem, remembered
 from problems.switching import inlined, nodes
 
 from ..numerics.batched import Batched
 from .limits import DENSE
-from .trajectory import PhaseTrajectory
+from .trajectory import PhaseTrajectory, Trajectory
 
 TABLES = ("LinearInterpolant", "BSplineInterpolant")
 FINE = np.linspace(-1.0, 1.0, 257)
@@ -50,8 +50,14 @@ class Rough:
         )
 
 
-def rough_tables(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> list[Rough]:
+def rough_tables(problem: CompiledProblem, trajectory: Trajectory) -> list[Rough]:
     """The tables that turn more than `MOST_TURNS` times along a trajectory, between the least and the greatest of their arguments."""
+    parameters = np.array([trajectory.parameters[v.name] for v in problem.parameters])
+    return [one for phase in problem.phases for one in _rough(phase, trajectory[phase.name], parameters)]
+
+
+def _rough(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.ndarray) -> list[Rough]:
+    """Those of one phase."""
     names, looked = _tables(phase)
     if not names or not np.isfinite(trajectory.states).all():
         return []

@@ -52,9 +52,11 @@ def test_points_hold_at_a_price_that_is_small(rough, monkeypatch):
     before, after = (front.simulate(tolerance=VERIFY) for front in (unchecked, kept))
     assert before.violation.max() > 10 * VERIFY and share(unchecked).min() < 0.99, "better than there is: they exceed their limits"
     assert after.violation.max() <= VERIFY and share(kept).min() > 1 - 1e-3
-    # A point of the search that no solve improved is left out where it exceeds its limits; each point of a solve is kept.
+    # A point of the search that no solve improved is left out where it exceeds its limits, and what it dominates comes back for it; each
+    # point of a solve is kept.
     solutions = [point for point in unchecked if not np.isclose(rough.F, point.F, rtol=1e-9).all(axis=1).any()]
-    assert len(kept) == len(solutions) >= 9 and np.median(share(kept)) < 1.03
+    assert 10 >= len(kept) >= len(solutions) >= 9 and np.median(share(kept)) < 1.03
+    assert not any(np.isclose(rough.F, point.F, rtol=1e-9).all(axis=1).any() for point in kept)
     moved = [point for point in kept if "inside its limits" in point.note]
     assert moved and all(point.optimality is None for point in moved)
     again = int(solved[0][2].sum())
