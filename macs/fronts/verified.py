@@ -176,7 +176,10 @@ def _allowed(points: Points, tolerance: float) -> float:
 
 def _misses(points: Points, i: int, found: Independent, off: np.ndarray, tolerance: float, allowed: float, remark: bool) -> list[str]:
     """In words, what point i misses by more than the tolerance."""
-    rough = _rough(points.compiled(), points.trajectories[i]) if points.dynamic and remark else []
+    rough: list[str] = []
+    if remark and (trajectory := points.trajectories[i]) is not None:
+        with spending("explanation"):
+            rough += [str(one) for one in rough_tables(points.compiled(), trajectory)[:1]]
     if points.dynamic and not np.isfinite(found.defect[i]):
         return [found.diverged[i], *rough]
     if not points.dynamic and not np.isfinite(found.F[i]).all():
@@ -191,13 +194,6 @@ def _misses(points: Points, i: int, found: Independent, off: np.ndarray, toleran
         k = int(np.where(np.isfinite(off), off, -1.0).argmax())
         reasons.append(f"its '{points.names[k]}' differs by {abs(found.F[i, k] - points.F[i, k]):.2g} {points.goals[k].unit}".rstrip())
     return [*reasons, *rough, *([found.jumps[i]] if i in found.jumps else [])]
-
-
-@spending("explanation")
-def _rough(problem: CompiledProblem, trajectory: Trajectory | None) -> list[str]:
-    """The first table that the mesh of a trajectory cannot follow, if there is any."""
-    assert trajectory is not None
-    return [str(one) for one in rough_tables(problem, trajectory)[:1]]
 
 
 def feasible_as_simulated(points: Points, tolerance: float) -> np.ndarray:

@@ -274,8 +274,8 @@ class MeshLoop:
 
     def _doubts(self, one: OnMesh) -> tuple[bool, bool]:
         """Whether a simulation clearly refutes a point, or refutes one that no other mesh confirms; and whether none confirms it."""
-        unsure = self.wanted.confirmed and bool(np.isinf(one.change))
-        return bool(one.verdict.complaints()) if unsure else one.verdict.error > 10.0, unsure
+        alone = self.wanted.confirmed and bool(np.isinf(one.change))
+        return one.verdict.error > 10.0 or (alone and bool(one.verdict.complaints())), alone
 
     def _improves(self, reached: OnMesh, present: OnMesh, task: Scalarised, least: float) -> bool:
         """Whether to continue on a mesh with knots, or of another point: its errors are not larger, and its optimum is no worse than the

@@ -70,8 +70,7 @@ def _rough(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: np.nda
         places, first = np.unique(arguments, return_index=True)
         if len(places) < 2 or not np.isfinite(own).all():
             continue
-        even = np.linspace(places[0], places[-1], 4 * len(FINE) + 1)
-        table = np.interp(even, places, own.ravel()[first])
+        table = np.interp(even := np.linspace(places[0], places[-1], 4 * len(FINE) + 1), places, own.ravel()[first])
         if (turns := _turns(table)) <= MOST_TURNS:
             continue
         width = 1.0
