@@ -220,9 +220,8 @@ class MeshLoop:
         """A point on meshes that simulations agree with, as far as the limits allow."""
         found, seen = Refinement(begun), [begun]
         present, history, waiting, detours = begun, [begun.verdict.error], list(hints), LOOP.detours
-        least = _achieved(begun, task)
         # Where a table is noisy, finer meshes see more of the noise.
-        patience = 1 if rough_tables(self.problem, begun.trajectory) else LOOP.patience
+        least, patience = _achieved(begun, task), 1 if rough_tables(self.problem, begun.trajectory) else LOOP.patience
         while len(found.meshes) < self.limit and not self.ended:
             reached, status = None, ""
             for proposal in self._proposals(present, waiting, detours > 0):
