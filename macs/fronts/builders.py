@@ -11,8 +11,9 @@ import numpy as np
 from problems.compiled import CompiledProblem, Objective
 from problems.vector import CompiledVectorProblem
 from transcription.base import NLP
+from transcription.meshes.minimum import OptimumMultipliers, gains
 from transcription.nlp.elastic import opposing
-from transcription.nlp.optimality import Conditions, costates
+from transcription.nlp.optimality import Conditions, Multipliers, costates
 from transcription.nlp.program import nlp_scales
 from transcription.stopping import Stopped, check_stopping
 from transcription.trajectories.costates import Costates
@@ -73,14 +74,15 @@ def no_points(
 
 @spending("certificates")
 def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray | None = None) -> dict[str, list[Any]]:
-    """The columns `optimality` and `costates` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None for those left
-    when the work is to end.
+    """The columns `optimality`, `costates` and `weighted_gain` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None
+    for those left when the work is to end.
 
-    Only what is `CERTIFIED` has costates: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other weights
+    Only what is `CERTIFIED` has the last two: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other weights
     may do as well at an end of a front.
     """
     optimality: list[float | None] = [None] * len(Z)
     found: list[Costates | None] = [None] * len(Z)
+    gained: list[float | None] = [None] * len(Z)
     with suppress(Stopped):
         for k, z in enumerate(Z):
             check_stopping()
@@ -93,8 +95,16 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
             feasible = nlp.evaluate(z[None])[1][0] <= CERTIFIED
             best = next((one for one in known if feasible and one.residual <= CERTIFIED), None)
             multipliers = None if best is None else best.multipliers()
-            found[k] = None if multipliers is None else costates(nlp, z, multipliers)
-    return {"optimality": optimality, "costates": found}
+            if multipliers is not None:
+                found[k], gained[k] = costates(nlp, z, multipliers), _weighted_gain(nlp, z, multipliers)
+    return {"optimality": optimality, "costates": found, "weighted_gain": gained}
+
+
+def _weighted_gain(nlp: NLP, z: np.ndarray, found: Multipliers) -> float | None:
+    """What other controls would gain in the weighted sum of the objectives, see `gains`; None where there are no costates to tell."""
+    quantities = [np.array(q).ravel() for q in nlp.quantities.call([z])]
+    phases = gains(nlp.problem, nlp.unpack(z), OptimumMultipliers.at(nlp, z, found), quantities, np.ones(len(nlp.problem.goals)))
+    return sum(float(gain.amounts.sum()) for gain in phases.values()) if phases else None
 
 
 def _alone(nlp: NLP, z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray, every: Conditions | None) -> Conditions | None:

@@ -178,6 +178,16 @@ class Point:
         return self._points.optimality[self.index]
 
     @property
+    def gain(self) -> float | None:
+        """What other controls would gain in all objectives together, to first order, by Pontryagin's minimum principle, as a part of what
+        counts as one in each: of the range of the front. None where it has no `costates` of a method on elements, or no `tolerances`.
+
+        A simulation does not see it: a point whose mesh has no edge at a switch of its controls simulates as it says, and is beaten by one
+        that switches at the right time. Where states or path constraints are at their limits, and on singular arcs, it says nothing.
+        """
+        return number(self._points.gain[self.index])
+
+    @property
     def costates(self) -> Costates | None:
         """Costates by phase and state, arrays at the nodes of the trajectory: `point.costates["ascent"]["vx"]`.
 

@@ -80,6 +80,11 @@ COLUMNS = {
         _optional_numbers, None, *_stored("optimality", NUMBER, "scaled residual of Pareto optimality, NaN if not computed")
     ),
     "costates": PointColumn(tuple),
+    "weighted_gain": PointColumn(
+        _array(float),
+        np.nan,
+        *_stored("weighted_gain", NUMBER, "what other controls would gain in the weighted sum of objectives, NaN if not known", True),
+    ),
     "notes": PointColumn(_notes, "", *_stored("note", TEXT, "remark on the point")),
     "transcriptions": PointColumn(shared),
     "defect": PointColumn(
@@ -170,6 +175,7 @@ class Points:
     excursions: tuple[Mapping[str, float] | None, ...]  # excess, scaled, of quantities that leave their bounds between nodes
     optimality: tuple[float | None, ...]  # scaled residual of the conditions of Pareto optimality
     costates: tuple[Costates | None, ...]  # of points that are optimal
+    weighted_gain: np.ndarray  # (n,): of these, what other controls would gain in the sum to which the costates belong; else NaN
     notes: tuple[str, ...]  # remarks, for example why a mesh could not be refined enough
     transcriptions: tuple[dict[str, Any] | None, ...]  # {"method": ..., "settings": {...}}: one dict for points on one mesh
     # By a simulation, NaN and False without one:
@@ -273,6 +279,13 @@ class Points:
     def was_simulated(self) -> np.ndarray:
         """Mask (n,) of the points that were simulated."""
         return ~np.isnan(self.defect)
+
+    @property
+    def gain(self) -> np.ndarray:
+        """What other controls would gain in all objectives together (n,), to first order, in what counts as one in each; NaN: not known."""
+        weights = [np.full(len(self.goals), np.nan) if one is None else one.weights for one in self.costates]
+        units = self.tolerances / self.within[:, None]
+        return self.weighted_gain / (np.reshape(weights, units.shape) * units).sum(axis=1)
 
     @property
     def variables(self) -> tuple[Variable, ...]:

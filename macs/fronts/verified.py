@@ -368,7 +368,7 @@ def simulated(
         F = np.array([list(one.objectives.values()) for one in found]).reshape(len(front), len(given.signs)) * given.signs
         violations = [_larger(one.violations, _decided(plan, given)) for one, plan in zip(found, planned, strict=True)]
         violation, otherwise = np.array([max(one.values(), default=0.0) for one in violations]), np.full(len(front), INFEASIBLE)
-        columns = {"trajectories": [one.trajectory for one in found], "optimality": None, "costates": None}
+        columns = {"trajectories": [one.trajectory for one in found], "optimality": None, "costates": None, "weighted_gain": None}
     plain = unmarked(front)
     return plain.replace(
         F=F,

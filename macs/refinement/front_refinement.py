@@ -15,8 +15,9 @@ import numpy as np
 from problems.checks import check_count, check_positive
 from transcription import from_dict
 from transcription.meshed import Meshed
+from transcription.meshes.minimum import OptimumMultipliers
 from transcription.meshes.verdict import Wanted
-from transcription.nlp.optimality import optimality
+from transcription.nlp.optimality import Conditions, optimality
 from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
@@ -197,7 +198,13 @@ class FrontRefinement:
         point = self.front[i]
         known = self._known(i)
         trajectory = self._trajectory(i)
-        begun = self.loop.on_mesh(self.methods[i], point.decision, point.F, trajectory, self.units, known)
+        nlp, z = self.loop.programs(self.methods[i]), point.decision
+        # What gains already is to be seen where it begins.
+        gaining = self.front.gain[i] > self.wanted.gained
+        conditions = Conditions.of(nlp, z, self.units) if gaining else None
+        multipliers = None if conditions is None else conditions.multipliers()
+        optimum = None if multipliers is None else OptimumMultipliers.at(nlp, z, multipliers)
+        begun = self.loop.on_mesh(self.methods[i], z, point.F, trajectory, self.units, known, optimum)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[: FRONT.neighbours]
         done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
         near_meshes = [self._first] if self._first else self._meshes_near(done, begun.verdict.error, task)

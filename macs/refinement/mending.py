@@ -109,6 +109,7 @@ class _Mending:
     def __init__(self, points: Points, verify: float, show: Callable[[str], None], ends: Points | None = None) -> None:
         problem = points.compiled()
         self.points, self.verify, self.show = points, verify, show
+        self._gain = SEARCH.optimum * verify  # what other controls may gain, as for a single optimum
         # Points are filled up from the first meshes, too, after others were refined.
         self.programs, self.simulations = Programs(problem, kept=MENDING.meshes), Simulations(problem, verify)
         self._solves = GradientSolves(float(points.stats["tolerance"]))
@@ -140,7 +141,8 @@ class _Mending:
         if fine is None:
             # What costs least comes first: the mesh and its program are there.
             again = tried = self._as_simulated(self._inside(again, _slightly_outside(again, self.verify), MENDING.loss), SEARCH.passable)
-        again = self._refined(again, self._meshed(again, again.was_simulated & ((fine is not None) | ~again.verified)), fine)
+        wanted = (fine is not None) | ~again.verified | (again.gain > self._gain)
+        again = self._refined(again, self._meshed(again, again.was_simulated & wanted), fine)
         # On a finer mesh, too, a point may exceed limits between nodes, and by less.
         moved = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
         again = self._as_before(self._inside(again, moved, MENDING.loss))
@@ -242,8 +244,9 @@ class _Mending:
         )
 
     def _as_before(self, points: Points) -> Points:
-        """The points, with the original in place of each that was verified originally and no longer is."""
-        unsure = np.flatnonzero(~points.verified & (self.points.verified | ~self.points.was_simulated)).tolist()
+        """The points, with the original in place of each that was verified originally and no longer is, or lost more than its tolerance."""
+        worse = ((points.simulated_F - self.points.simulated_F) / objective_scales(self.points)).max(axis=1) > self.verify
+        unsure = np.flatnonzero((~points.verified | worse) & (self.points.verified | ~self.points.was_simulated)).tolist()
         lost = [i for i in unsure if points.trajectories[i] is not self.points.trajectories[i]]
         if not lost:
             return points
@@ -262,11 +265,11 @@ class _Mending:
         if not rows:
             return points
         limits = MENDING.part * self.verify
-        wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
+        wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False, gain=self._gain)
         scales = objective_scales(points)
 
         def enough(point: OnMesh) -> bool:
-            return largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
+            return not point.gaining and largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
 
         # Where only objectives are off, those of the simulation are known, too.
         blurred = fine is None and bool(feasible_as_simulated(points, self.verify)[rows].all())

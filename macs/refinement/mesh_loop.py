@@ -86,7 +86,7 @@ class OnMesh:
     @property
     def gaining(self) -> bool:
         """Whether other controls are known to gain more than the tolerance of an objective."""
-        return not self.tried and self.verdict.gain > self.verdict.wanted.settled
+        return not self.tried and self.verdict.gain > self.verdict.wanted.gained
 
     @property
     def error(self) -> float:
@@ -94,16 +94,16 @@ class OnMesh:
         wanted = self.verdict.wanted
         # What no other mesh has confirmed is less wrong than what a simulation refutes.
         change = self.change if np.isfinite(self.change) else 10.0 * wanted.settled
-        unsettled = max(change, self.verdict.gain if self.gaining else 0.0) / wanted.settled
-        return max(self.verdict.error, unsettled if wanted.confirmed else 0.0)
+        unsettled = change / wanted.settled if wanted.confirmed else 0.0
+        return max(self.verdict.error, unsettled, self.verdict.gain / wanted.gained if self.gaining else 0.0)
 
     def complaints(self) -> list[str]:
         """Reasons why the point is not good enough; empty if it is."""
         found = self.verdict.complaints()
-        if not self.verdict.wanted.confirmed:
-            return found
         if self.gaining:
             found.append(f"other controls would gain {self.verdict.gain:.1e} of the front's range, to first order")
+        if not self.verdict.wanted.confirmed:
+            return found
         if np.isinf(self.change):
             found.append("it was not solved on a finer mesh")
         elif not self.change <= self.verdict.wanted.settled:
@@ -205,7 +205,7 @@ class MeshLoop:
         optimum: OptimumMultipliers | None = None,
     ) -> OnMesh:
         """The assessment of a vector that was found on a mesh."""
-        verdict = judge(self.problem, trajectory, self.wanted, F, units, optimum if self.wanted.confirmed else None)
+        verdict = judge(self.problem, trajectory, self.wanted, F, units, optimum)
         achieved = simulated_objectives(self.problem, verdict.simulation)
         feasible = verdict.simulation.violation <= self.wanted.feasible and verdict.leaving <= max(
             self.wanted.feasible, self.wanted.leaving

@@ -17,7 +17,7 @@ import numpy as np
 from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
 
 from ..base import NLP
-from ..nlp.optimality import hamiltonian, integral_weights
+from ..nlp.optimality import Multipliers, hamiltonian, integral_weights
 from ..numerics.polynomials import gauss_legendre
 from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
@@ -42,6 +42,11 @@ class OptimumMultipliers:
         """From the multipliers (m + r,) of the objectives and rows of an NLP at its optimum z (n,)."""
         m, constraints = len(nlp.problem.goals), len(nlp.problem.limits)
         return cls(nlp.costates(z, multipliers[m:]), multipliers[:m], multipliers[len(multipliers) - constraints :])
+
+    @classmethod
+    def at(cls, nlp: NLP, z: np.ndarray, found: Multipliers) -> OptimumMultipliers:
+        """From the multipliers that the conditions of optimality at z (n,) have."""
+        return cls.of(nlp, z, np.concatenate([found.of_objectives, found.of_rows]))
 
 
 @dataclass(frozen=True, eq=False)

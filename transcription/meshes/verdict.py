@@ -29,6 +29,12 @@ class Wanted:
     # Whether a finer mesh has to confirm the objectives, too; otherwise it is enough that a simulation does, and meshes are not refined
     # for controls that polynomials of their degree describe poorly.
     confirmed: bool = True
+    gain: float | None = None  # largest gain of other controls, see `minimum`, in units of objectives; by default as for objectives
+
+    @property
+    def gained(self) -> float:
+        """Largest gain of other controls, in units of the objectives."""
+        return self.settled if self.gain is None else self.gain
 
     @property
     def settled(self) -> float:
