@@ -77,8 +77,8 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
     """The columns `optimality`, `costates` and `weighted_gain` of vectors (k, n), for objectives in `ranges` (m,) or their own scales; None
     for those left when the work is to end.
 
-    Only what is `CERTIFIED` has the last two: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other weights
-    may do as well at an end of a front.
+    Only what is `CERTIFIED` has the last two: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other
+    weights may do as well at an end of a front.
     """
     optimality: list[float | None] = [None] * len(Z)
     found: list[Costates | None] = [None] * len(Z)
