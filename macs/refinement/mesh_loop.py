@@ -274,7 +274,7 @@ class MeshLoop:
     def _doubts(self, one: OnMesh) -> tuple[bool, bool]:
         """Whether a simulation clearly refutes a point, or refutes one that no other mesh confirms; and whether none confirms it."""
         alone = self.wanted.confirmed and bool(np.isinf(one.change))
-        return one.verdict.error > 10.0 or (alone and bool(one.verdict.complaints())), alone
+        return one.verdict.error > (10.0 if self.wanted.confirmed and not alone else 1.0), alone
 
     def _improves(self, reached: OnMesh, present: OnMesh, task: Scalarised, least: float) -> bool:
         """Whether to continue on a mesh with knots, or of another point: its errors are not larger, and its optimum is no worse than the

@@ -228,3 +228,27 @@ def test_what_a_point_wastes_without_any_effect_on_its_own_objective_is_saved():
     found = mending.mended(wasteful, 1e-3)
     assert found.verified.all() and pytest.approx(front.F, abs=1e-4) == found.F
     assert found.stats["gradient_solves"] <= wasteful.stats["gradient_solves"] + 4, "at most two solves for each end"
+
+
+def test_points_that_other_controls_would_better_are_solved_again(tmp_path) -> None:
+    """A cart from rest to rest, thrust on both sides: fuel against time is T - sqrt(T^2 - 4), with switches between elements' edges."""
+    problem = Problem("cart")
+    ride = problem.phase("ride", t0=0, tf=(2, 10))
+    _, v = ride.state("x", bounds=(-1, 2), initial=0, final=1), ride.state("v", bounds=(-2, 2), initial=0, final=0)
+    forth, back = ride.control("forth", bounds=(0, 1)), ride.control("back", bounds=(0, 1))
+    ride.dynamics(x=v, v=forth - back)
+    problem.minimize("time", ride.tf)
+    problem.minimize("fuel", ride.integral(forth + back))
+
+    def off(front: Front) -> np.ndarray:
+        time, fuel = front.objectives.T
+        return fuel - (time - np.sqrt(np.maximum(time**2 - 4, 0)))
+
+    coarse = sweep(problem, DFET(9, 3, basis="bernstein"), points=5, starts=1)
+    assert coarse.verified.all() and off(coarse).min() > 5e-3 and coarse.gain.min() > 3e-4
+    better = coarse.mended()
+    good = off(better) < 2e-4
+    assert better.verified.all() and good.sum() >= 4 and (better.gain[good] < 1e-4).all()
+    better.save(tmp_path / "cart.nc")
+    again = Front.load(tmp_path / "cart.nc")
+    assert [point.gain for point in again[1:3]] == pytest.approx(better.gain[1:3], rel=1e-12)
