@@ -141,8 +141,8 @@ class _Mending:
         if fine is None:
             # What costs least comes first: the mesh and its program are there.
             again = tried = self._as_simulated(self._inside(again, _slightly_outside(again, self.verify), MENDING.loss), SEARCH.passable)
-        wanted = (fine is not None) | ~again.verified | (again.gain > self._gain)
-        again = self._refined(again, self._meshed(again, again.was_simulated & wanted), fine)
+        again = self._refined(again, self._meshed(again, again.was_simulated & ((fine is not None) | ~again.verified)), fine)
+        again = self._refined(again, self._meshed(again, again.verified & (again.gain > self._gain)))
         # On a finer mesh, too, a point may exceed limits between nodes, and by less.
         moved = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
         again = self._as_before(self._inside(again, moved, MENDING.loss))
@@ -260,12 +260,12 @@ class _Mending:
         return [i for i in np.flatnonzero(rows).tolist() if isinstance(from_dict(points[i].transcription or {}), Meshed)]
 
     @_unless_stopped
-    def _refined(self, points: Points, rows: list[int], fine: Meshed | None) -> Points:
+    def _refined(self, points: Points, rows: list[int], fine: Meshed | None = None) -> Points:
         """The points with some of them on a `fine` mesh, or finer ones of their own, as far as the work allows; simulated."""
         if not rows:
             return points
-        limits = MENDING.part * self.verify
-        wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False, gain=self._gain)
+        limits, gaining = MENDING.part * self.verify, fine is None and bool(points.verified[rows].all())
+        wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False, gain=self._gain if gaining else np.inf)
         scales = objective_scales(points)
 
         def enough(point: OnMesh) -> bool:
@@ -273,7 +273,7 @@ class _Mending:
 
         # Where only objectives are off, those of the simulation are known, too.
         blurred = fine is None and bool(feasible_as_simulated(points, self.verify)[rows].all())
-        most = self._most_work(points, len(rows), fine, 0.0 if blurred else MENDING.share)
+        most = self._most_work(points, 0 if gaining else len(rows), fine, 0.0 if blurred or gaining else MENDING.share)
         job = FrontRefinement(points, wanted, MENDING.meshes, rows, most, self.programs, enough, MENDING.patience, first=fine)
         job.go(self.show)
         again = self.marked(job.points(0.0, ""))
