@@ -35,9 +35,7 @@ class MultistartLimits:
     excess: float = 1e-8  # part of an objective's range by which its limit may be exceeded
     clearly: float = 1e-7  # difference in alpha by which a result is clearly better: the accuracy of solves
     iterations: int = 200  # most of each further start
-    # Of solves for given times: most iterations, since one that takes more has no feasible point, or is not convex; in how many parts the
-    # range of a time is divided at whose ends there are such solves; and how many in a row without a feasible point are the last.
-    held: tuple[int, int, int] = (50, 16, 2)
+    held: int = 50  # most iterations of a solve for given times: one that takes more has no feasible point, or is not convex
     infeasible: tuple[int, int] = (8, 16)  # fewest and most starts without a feasible vector; between them, what took `WORK.little`
     everywhere: int = 3  # starts from everywhere before only each second one is: the others are near the best that is known
     hopeless: float = 100.0  # scales by which propagated states violate constraints so that the states of the guess are the better start
@@ -217,10 +215,10 @@ class MultistartSolver:
         self._timed, (rows, columns) = True, objective_gradients(self.nlp).sparsity_out(0).get_triplet()
         for i in np.intersect1d(np.array(rows)[~np.isin(columns, times)], np.flatnonzero(self.convex)).tolist():
             z, failed, least = self._known.Z[0] if len(self._known) else self._starts.draw()[0], 0, -np.inf
-            for given in np.linspace(self.nlp.upper[times], self.nlp.lower[times], MULTISTART.held[1] + 1):
+            for given in np.linspace(self.nlp.upper[times], self.nlp.lower[times], 17):
                 found = self._held(z, Scalarised.single(i, m), given)
                 failed = 0 if found.status == CONVERGED else failed + 1
-                if failed == MULTISTART.held[2] or stopping():
+                if failed == 2 or stopping():  # shorter times are infeasible, too
                     break
                 if not failed:
                     self._uneven += [i] if found.F[i] < least - MULTISTART.rounding * abs(least) else []
@@ -228,7 +226,7 @@ class MultistartSolver:
 
     def _held(self, start: np.ndarray, task: Scalarised, times: np.ndarray) -> Solved:
         """The result of a solve from a vector (n,) for given times (k,)."""
-        with self.solves.at_most(MULTISTART.held[0]):
+        with self.solves.at_most(MULTISTART.held):
             return self.solves(self.nlp, self._with_times(start, times), task, held=self.nlp.times)
 
     def _added(self, solved: Solved) -> Solved:

@@ -12,15 +12,13 @@ from problems.compiled import CompiledPhase, CompiledProblem, remembered
 from problems.switching import inlined, nodes
 
 from ..numerics.batched import Batched
-from .limits import DENSE
 from .trajectory import PhaseTrajectory, Trajectory
 
 TABLES = ("LinearInterpolant", "BSplineInterpolant")
 FINE = np.linspace(-1.0, 1.0, 257)
 """Places of an element at which tables are looked at."""
-MOST_TURNS = len(DENSE)
-"""How often a table may turn, from up to down or back, along a phase: no more than there are samples of one element. A mesh needs about an
-element for each."""
+MOST_TURNS = 33
+"""How often a table may turn, from up to down or back, along a phase: a mesh needs about an element for each."""
 
 
 @dataclass(frozen=True)
