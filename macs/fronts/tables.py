@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,11 +15,9 @@ from transcription.trajectories.costates import hamiltonian_variation
 
 from ..evaluation.evaluator import CONVERGED
 from ..io.text import call, counted, duration, html_block, html_table, numbers, text_table
+from .point import Point
+from .points import Points
 from .verified import AGAIN, MISSES, constant_objectives, missed, untrusted
-
-if TYPE_CHECKING:
-    from .point import Point
-    from .points import Points
 
 
 def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
@@ -200,21 +198,26 @@ def _by_inner_solver(name: str, evaluations: int, feasible: int | None = None, w
     return f"{counted(evaluations, 'candidate')} {was} {how}{known}."
 
 
-def explain(point: Point) -> str:
-    """What is known of how far a point can be trusted, and why it is not verified, a sentence a line.
+def explain(point: Point | Points) -> str:
+    """What is known of how far a point, or each of a front, can be trusted, and why it is not verified, a sentence a line.
 
-    The first line is its number and objectives. Then follow whether it converged, and the constraint that it violates most if it did not;
+    The first line of a point is its number and objectives. Then follow whether it converged, and the constraint that it violates most if it did not;
     whether it is verified, and what its simulation misses, where, and what to do about it; the remarks of the table of its front on this
     point; and whether its Hamiltonian shows that its mesh does not resolve the optimum.
 
     Parameters
     ----------
-    point : Point
-        Of any front, from a search, a gradient tool, or a file. Nothing is simulated: `Front.verify` does that.
+    point : Point or Front
+        From a search, a gradient tool, or a file. Nothing is simulated: `Front.verify` does that.
 
     Returns
     -------
     str
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
 
     Examples
     --------
@@ -224,6 +227,10 @@ def explain(point: Point) -> str:
     >>> print(explain(point).split(": ", 1)[1].splitlines()[1])
     It is verified: what a simulation gives differs by no more than its tolerances.
     """
+    if isinstance(point, Points):
+        return "\n\n".join(map(explain, point)) or point.message
+    if not isinstance(point, Point):
+        raise TypeError(f"explain takes a point or a front, not {type(point).__name__}")
     lines = [f"Point {point.index}: {point.title}."]
     if point.status != CONVERGED:
         worst = max(point.violations, key=lambda name: point.violations[name], default="")

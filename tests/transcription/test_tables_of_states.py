@@ -73,6 +73,9 @@ def test_the_note_names_the_table_and_explain_says_it():
 def test_explain_of_points_without_trajectories():
     box = NSGA2(population=8).minimize(lambda X: np.stack([X[:, 0], 1 - X[:, 0]], axis=1), [(0, 1)], evaluations=16, seed=0)
     assert explain(box[0]).endswith("There is nothing to verify of a black box.")
+    assert explain(box) == "\n\n".join(explain(point) for point in box)
+    with pytest.raises(TypeError, match="takes a point or a front, not dict"):
+        explain({})
     good = optimize(cart(np.zeros(len(PLACES))), DFET(4, 4), starts=1)
     assert "It is verified" in explain(good)
     assert "It was not simulated" in explain(optimize(cart(np.zeros(len(PLACES))), DFET(4, 4), starts=1, verify=None))
