@@ -44,6 +44,7 @@ class LoopLimits:
     # If a point gets worse by more than this, in units of what an objective may be off, it is also sought near where it was: a solve on a
     # finer mesh may take moving edges away from the switches at which they lay.
     slip: float = 0.1
+    refuted: float = 10.0  # error, in tolerances, above which a simulation clearly refutes a point; that without another mesh
     drift: float = 1e-2  # if a point gets worse by more than this, in units, other starts are tried too
 
 
@@ -93,7 +94,7 @@ class OnMesh:
         """The largest error, or change from the previous mesh, in units of the tolerance."""
         wanted = self.verdict.wanted
         # What no other mesh has confirmed is less wrong than what a simulation refutes.
-        change = self.change if np.isfinite(self.change) else 10.0 * wanted.settled
+        change = self.change if np.isfinite(self.change) else LOOP.refuted * wanted.settled
         unsettled = change / wanted.settled if wanted.confirmed else 0.0
         return max(self.verdict.error, unsettled, self.verdict.gain / wanted.gained if self.gaining else 0.0)
 
@@ -274,7 +275,7 @@ class MeshLoop:
     def _doubts(self, one: OnMesh) -> tuple[bool, bool]:
         """Whether a simulation clearly refutes a point, or refutes one that no other mesh confirms; and whether none confirms it."""
         alone = self.wanted.confirmed and bool(np.isinf(one.change))
-        return one.verdict.error > (10.0 if self.wanted.confirmed and not alone else 1.0), alone
+        return one.verdict.error > (LOOP.refuted if self.wanted.confirmed and not alone else 1.0), alone
 
     def _improves(self, reached: OnMesh, present: OnMesh, task: Scalarised, least: float) -> bool:
         """Whether to continue on a mesh with knots, or of another point: its errors are not larger, and its optimum is no worse than the
