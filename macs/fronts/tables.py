@@ -201,9 +201,9 @@ def _by_inner_solver(name: str, evaluations: int, feasible: int | None = None, w
 def explain(point: Point | Points) -> str:
     """What is known of how far a point, or each of a front, can be trusted, and why it is not verified, a sentence a line.
 
-    The first line of a point is its number and objectives. Then follow whether it converged, and the constraint that it violates most if it did not;
-    whether it is verified, and what its simulation misses, where, and what to do about it; the remarks of the table of its front on this
-    point; and whether its Hamiltonian shows that its mesh does not resolve the optimum.
+    The first line of a point is its number and objectives. Then follow whether it converged, and the constraint that it violates most if it
+    did not; whether it is verified, and what its simulation misses, where, and what to do about it; the remarks of the table of its front
+    on this point; and whether its Hamiltonian shows that its mesh does not resolve the optimum.
 
     Parameters
     ----------
