@@ -38,7 +38,6 @@ class GradientRules:
     first_points: int = 10  # most points of the front that are found before the search begins
     unseen: float = 0.1  # probability of another optimum below which there are starts enough to begin with, if all led to one
     evaluations_per_start: int = 20  # at the beginning, one start may be drawn for so many evaluations
-    other_optimum: float = 1e-3  # part of the ranges by which the result of another start must be worse to be another optimum
     flat: float = 0.05  # least component of a direction in the weights: a smaller one would leave its objective without control
     least_polish: int = 60  # solves that a polish may always make if proposals are mostly propagated: solves then find the points
     polish_per_point: int = 8  # most solves in the polish of a round, for each point that the archive may have
@@ -165,7 +164,7 @@ def restart_solves(
             found.append(solver.from_vector(start, task))
             alpha, known = task.optimum(found[-1]), solver.merits(task, archive.F, archive.violation).min()
             worse |= alpha is not None and bool(
-                alpha > known + GRADIENT_RULES.other_optimum * (span / np.where(task.moving, task.weights, np.inf)).max()
+                alpha > known + MULTISTART.same * (span / np.where(task.moving, task.weights, np.inf)).max()
             )
     return _feasible_of(found, evaluator), worse
 
