@@ -211,8 +211,9 @@ class Assembly:
         extended, found = self.layout.extended(np.asarray(z, dtype=float)[None])[0], {}
         for writer in self._declared:
             name = writer.phase.name
-            paths, peaks, states = ([of_rows[one] for one in rows.samples.get((name, kind), ())] for kind in ("path", "peak", "state"))
-            multipliers = PhaseMultipliers(of_rows[rows.dynamics[name]], paths, peaks, states, weights[name], of_bounds)
+            kinds = ("path", "peak", "state", "size")
+            paths, peaks, states, sizes = ([of_rows[one] for one in rows.samples.get((name, kind), ())] for kind in kinds)
+            multipliers = PhaseMultipliers(of_rows[rows.dynamics[name]], paths, peaks, states, sizes, weights[name], of_bounds)
             found[name] = _adjoint(writer, extended, multipliers)
         return found
 

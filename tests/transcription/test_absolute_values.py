@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from macs import optimize
 from problems import Problem
@@ -116,10 +117,45 @@ def test_where_large_is_good_they_are_left_as_they_are(state):
     assert transfer(state).compile().phases[0].sized == () and transfer().compile().phases[0].sized == (0,)
 
 
-def test_by_shooting_what_varies_on_an_interval_is_left_as_it_is():
+def test_by_shooting_controls_alone_have_one_absolute_value_where_they_are_constant():
     def rows(method: MultipleShooting, integrand) -> int:
         problem = transfer(integral=lambda phase, u: phase.integral(integrand(phase)))
         return sum("absolute values" in label for label in method.transcribe(problem).g_labels)
 
-    assert rows(MultipleShooting(6), lambda phase: ca.fabs(phase["u"]) + ca.fabs(phase["v"]) + ca.fabs(phase.time * phase["u"])) == 2 * 6
-    assert rows(MultipleShooting(6, control="linear"), lambda phase: ca.fabs(phase["u"])) == 0
+    assert rows(MultipleShooting(6), lambda phase: ca.fabs(phase["u"])) == 2 * 6
+    assert rows(MultipleShooting(6, control="linear"), lambda phase: ca.fabs(phase["u"])) == 2 * 6 * 3
+    assert rows(MultipleShooting(6), lambda phase: ca.fabs(phase["v"]) + ca.fabs(phase.time * phase["u"])) == 2 * 2 * 6 * 4
+
+
+def least_deviation(target=lambda time: 0.0) -> Problem:
+    problem = Problem("deviation")
+    phase = problem.phase("move", t0=0.0, tf=3.0)
+    x, u = phase.state("x", bounds=(-3, 3), initial=1), phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=u)
+    problem.minimize("deviation", phase.integral(ca.fabs(x - target(phase.time))))
+    return problem
+
+
+@pytest.mark.parametrize("method", [MultipleShooting(12), MultipleShooting(12, scheme="rk8"), SingleShooting(13), DFET(6, 2)], ids=str)
+def test_a_state_is_brought_to_zero_and_held_there(method):
+    """x = 1 - t until t = 1, then nothing: 1/2. Its costate is what deviation is still to come: 1 - t, then nothing."""
+    point = optimize(least_deviation(), method, starts=1)
+    assert point.status == "converged" and point.objectives["deviation"] == pytest.approx(0.5, abs=1e-6)
+    assert point.trajectory["move"].at(np.array([0.5, 1.5, 2.5]))["x"] == pytest.approx([0.5, 0.0, 0.0], abs=1e-6)
+    # The stage at t = 1, of weight 1/6 in a step of 1/4, has any multiplier up to its weight.
+    assert np.abs(point.costates["move"]["x"]) == pytest.approx(np.maximum(1 - point.trajectory["move"].time, 0), abs=0.25 / 6 + 1e-4)
+
+
+@pytest.mark.parametrize("method", [MultipleShooting(24, control="linear"), SingleShooting(25, control="spline")], ids=str)
+def test_lines_and_splines_approach_thrust_that_jumps(method):
+    point = optimize(transfer(), method, starts=1)
+    assert point.status == "converged" and point.objectives["fuel"] == pytest.approx(2.0, abs=0.015)
+
+
+@pytest.mark.parametrize("method", [MultipleShooting(40), SingleShooting(41)], ids=str)
+def test_a_target_that_moves_is_met_and_followed(method):
+    """x = 1 - t until it meets sin(t) / 2, at t with 1 - t = sin(t) / 2."""
+    meets = brentq(lambda t: 1 - t - 0.5 * np.sin(t), 0.0, 1.0)
+    point = optimize(least_deviation(lambda t: 0.5 * ca.sin(t)), method, starts=1)
+    right = meets - 0.5 * meets**2 + 0.5 * np.cos(meets) - 0.5
+    assert point.status == "converged" and point.objectives["deviation"] == pytest.approx(right, abs=2e-3)

@@ -28,10 +28,12 @@ class PhaseMultipliers:
     """The multipliers of one phase, positive at upper limits."""
 
     dynamics: np.ndarray  # (k,): Of its rows of dynamics
-    # paths, peaks, states: Of the samples of each path constraint and each peak, and of the hidden states that have bounds.
+    # paths, peaks, states, sizes: Of the samples of each path constraint and each peak, of the hidden states that have bounds, and of what
+    # keeps variables from being less than absolute values.
     paths: Sequence[np.ndarray]
     peaks: Sequence[np.ndarray]
     states: Sequence[np.ndarray]
+    sizes: Sequence[np.ndarray]
     integrals: np.ndarray  # (nq,): What a unit of each integral counts
     variables: np.ndarray  # (n,): Of the bounds of all variables of the NLP
 
@@ -100,9 +102,12 @@ def _part(difference: np.ndarray, costates: np.ndarray, units: np.ndarray) -> fl
 def slopes(
     phase: CompiledPhase, x: np.ndarray, u: np.ndarray, times: np.ndarray, s: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The transposed derivatives (k, nx, nx) of the rates by the states at k places, and those (k, nx) of the weighted integrands."""
+    """The transposed derivatives (k, nx, nx) of the rates by the states at k places, and those (k, nx) of the integrands, weighted, or
+    of integrands and sizes: weights (nq,) or (k, nq + sizes)."""
     nx, k = len(phase.states), len(times)
-    by_x, own = _slopes(phase)(x, u, times, np.tile(s, (k, 1)), np.tile(weights, (k, 1)))
+    every = np.zeros((k, phase.integrands.size1_out(0) + len(phase.sized)))
+    every[:, : weights.shape[-1]] = weights
+    by_x, own = _slopes(phase)(x, u, times, np.tile(s, (k, 1)), every)
     # Column by column, as CasADi stores them: that of a state has the derivatives by it.
     return by_x.reshape(k, nx, nx), own
 
@@ -111,8 +116,9 @@ def slopes(
 def _slopes(phase: CompiledPhase) -> Batched:
     """(x, u, t, s, weights) -> the derivatives of `slopes`."""
     inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]
-    weights = ca.MX.sym("w", phase.integrands.size1_out(0))
-    values = ca.jacobian(phase.dynamics(*inputs), inputs[0]), ca.gradient(ca.dot(phase.integrands(*inputs), weights), inputs[0])
+    weighed = ca.vertcat(phase.integrands(*inputs), phase.sizes(*inputs))
+    weights = ca.MX.sym("w", weighed.numel())
+    values = ca.jacobian(phase.dynamics(*inputs), inputs[0]), ca.gradient(ca.dot(weighed, weights), inputs[0])
     return Batched(expanded(ca.Function("slopes", [*inputs, weights], [ca.densify(one) for one in values])))
 
 

@@ -84,8 +84,8 @@ class Rows:
     dynamics: dict[str, slice] = field(default_factory=dict)
     """Where the rows of dynamics of each phase are."""
     samples: dict[tuple[str, str], list[slice]] = field(default_factory=dict)
-    """Where the rows of each of its path constraints ("path"), peaks ("peak") and bounded hidden states ("state") are, by its name and
-    that word."""
+    """Where the rows of each of its path constraints ("path"), peaks ("peak"), bounded hidden states ("state") and absolute values ("size")
+    are, by its name and that word."""
 
     def add(
         self,

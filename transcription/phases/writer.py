@@ -203,14 +203,25 @@ class PhaseWriter(ABC):
         returns these (n k,)."""
         plain, roots = ([i for i, k in enumerate(chosen) if self.phase.roots[k] is root] for root in (False, True))
         scales, label, k = np.array(self.phase.size_scales)[list(chosen)], f"absolute values in '{self.phase.name}'", sizes.shape[1]
+        of = self.phase.name, "size"
         for sign in (1.0, -1.0) if plain else ():
-            rows.add(sign * sizes[plain, :] - S[plain, :], -np.inf, 0.0, np.tile(scales[plain], k), label, propagated=True)
+            rows.add(sign * sizes[plain, :] - S[plain, :], -np.inf, 0.0, np.tile(scales[plain], k), label, propagated=True, of=of)
         if roots:
             one = ca.MX.sym("S", len(roots))
             (squares,) = rows.at_points(ca.Function("squares", [one], [one * one]), S[roots, :])
-            rows.add(sizes[roots, :] - squares, -np.inf, 0.0, np.tile(scales[roots] ** 2, k), label, propagated=True)
+            rows.add(sizes[roots, :] - squares, -np.inf, 0.0, np.tile(scales[roots] ** 2, k), label, propagated=True, of=of)
         least = [ca.sqrt(ca.fmax(row, 0.0)) if i in roots else ca.fabs(row) for i, row in enumerate(ca.vertsplit(sizes))]
         return ca.vec(ca.vertcat(*least)) if least else ca.MX(0, 1)
+
+    def of_sizes(self, multipliers: PhaseMultipliers, chosen: Sequence[int], k: int) -> np.ndarray:
+        """What a unit of each of the sizes (k, n) counts that `add_sizes` was given first."""
+        roots, rows = np.array(self.phase.roots, dtype=bool)[list(chosen)], iter(multipliers.sizes)
+        found = np.zeros((k, len(roots)))
+        if not roots.all():
+            found[:, ~roots] = (next(rows) - next(rows)).reshape(k, -1)
+        if roots.any():
+            found[:, roots] = next(rows).reshape(k, -1)
+        return found
 
     def trajectory(
         self, extended: np.ndarray, tau: np.ndarray, state: PiecewisePolynomial, control: PiecewisePolynomial

@@ -43,8 +43,7 @@ class Shooting(Transcription):
         Equal steps of that method on each interval.
     control : "constant", "linear" or "spline"
         Controls between their nodes: constant, with a value for each interval between two of them; straight lines or a cubic
-        spline through a value at each. They stay within their bounds at the nodes; but for splines, everywhere. Integrals of absolute
-        values are smooth for constant ones only, where they are of controls (and parameters) alone.
+        spline through a value at each. They stay within their bounds at the nodes; but for splines, everywhere.
     control_nodes : int, optional
         Number of equally spaced nodes of the controls, both ends among them; by default those of the states. No step leads across one:
         where they fall into a step, it is divided. Among intervals of other lengths they lie in the same intervals, at the same parts.

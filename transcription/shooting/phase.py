@@ -28,10 +28,11 @@ LONGEST_CHAIN = 3_000_000
 class ShootingPhase(PhaseWriter):
     """One phase on M intervals.
 
-    Slots: `U` (values, nu) of the controls, `S` (values, k) of the absolute values that are constant where the controls are, and, where the
-    intervals are apart (multiple shooting), `B` (M + 1, nx) states at their ends, which are unknowns of their own. Hidden: `R` (shots, nx),
-    where the states arrive from the left at the end of each shot; `Y` (M - 1, nx), states at the nodes that are no variables (single
-    shooting); `Q` integrals; `W` (points, rows) samples of path constraints and peaks.
+    Slots: `U` (values, nu) of the controls, `S` (N, stages, k) of absolute values and `F` (N, places, k) of those that depend on nothing
+    that varies in time but controls, and, where the intervals are apart (multiple shooting), `B` (M + 1, nx) states at their ends, which
+    are unknowns of their own. Hidden: `R` (shots, nx), where the states arrive from the left at the end of each shot; `Y` (M - 1, nx),
+    states at the nodes that are no variables (single shooting); `Q` integrals; `W` (points, rows) samples of path constraints and peaks;
+    `A` (N, stages, k), of which `S` are the absolute values.
     """
 
     def __init__(
@@ -51,18 +52,22 @@ class ShootingPhase(PhaseWriter):
         self.Q = layout.add_hidden(phase.integrands.size1_out(0))
         points = mesh.steps * len(step.points) + (1.0 not in step.points)
         self.W = layout.add_hidden(points if step.rows else 0, step.rows)
-        self._sized = _sized_by_controls(phase) if law.jumps else []
-        self.S = layout.add_table(prefix, self.sizes(self._sized), law.count, 1)[:, 0]
-        self.magnitudes = self.S.ravel()
-        self.interior = np.concatenate([self.B[1:-1].ravel(), self.Y.ravel(), self.W.ravel()])
+        self.A = layout.add_hidden(mesh.steps, len(step.weights), len(step.sized))
+        self.S = layout.add_table(prefix, self.sizes(step.sized), *self.A.shape[:2])
+        # One place in each step where controls are constant, else one for each time of a stage.
+        self._fixed = [k for k in range(len(phase.sized)) if k not in step.sized]
+        self._places = {0.0: 1.0} if law.jumps else step.scheme.quadrature
+        self.F = layout.add_table(prefix, self.sizes(self._fixed), mesh.steps, len(self._places))
+        self.magnitudes = np.concatenate([self.S.ravel(), self.F.ravel()])
+        self.interior = np.concatenate([part.ravel() for part in (self.B[1:-1], self.Y, self.W, self.A)])
         self.compilable, self.wide = step.symbolic, step.plain
         # In each shot, a row depends on half of the shot's controls in the mean.
-        rows = self.R.size + self.Y.size + self.W.size
+        rows = self.R.size + self.Y.size + self.W.size + self.A.size
         self.dense = rows * int((self.U >= 0).sum()) // (2 * len(self.R))
 
     def hidden(self, extended: ca.MX) -> tuple[np.ndarray, ca.MX]:
-        states, integrals, samples = zip(*self._propagated_shots(extended), strict=True)
-        return self._hidden(extended, ca.horzcat(*states), sum(integrals), ca.horzcat(*samples))
+        states, integrals, *seen = zip(*self._propagated_shots(extended), strict=True)
+        return self._hidden(extended, ca.horzcat(*states), sum(integrals), *(ca.horzcat(*parts) for parts in seen))
 
     def write(self, extended: ca.MX, rows: Rows) -> Written:
         phase, pick = self.phase, self.layout.pick
@@ -78,19 +83,22 @@ class ShootingPhase(PhaseWriter):
         return Written(*ends, integrals, seen[len(phase.paths) :, :], least)
 
     def _with_sizes(self, extended: ca.MX, rows: Rows) -> tuple[ca.MX, ca.MX]:
-        """The integrals, absolute values that are constant where controls are by variables S, and the least values of these."""
-        pick, phase = self.layout.pick, self.phase
-        integrals, U = pick(extended, self.Q), pick(extended, self.U)
-        if not self._sized:
-            return integrals, ca.MX(0, 1)
-        S, s = pick(extended, self.S), pick(extended, self.ends.statics)
-        sizes = phase.sizes.map(self.law.count)(0, U, 0, ca.repmat(s, 1, self.law.count))[self._sized, :]
-        least = self.add_sizes(rows, sizes, S, self._sized)
-        entries = ca.vertsplit(integrals)
-        totals = (s[1] - s[0]) * (S @ ca.DM(np.diff(self.law.edges)))
-        for k, total in zip(self._sized, ca.vertsplit(totals), strict=True):
-            entries[phase.sized[k]] = total
-        return ca.vertcat(*entries), least
+        """The integrals, those of absolute values as sums of the variables S and F, and the least values of these."""
+        pick, n, (C, _, h, s) = self.layout.pick, self.mesh.steps, self._inputs(extended)
+        law, one, places = ca.MX.sym("C", C.shape[0], self.law.degree + 1), ca.MX.sym("s", s.shape[0]), list(self._places)
+        values = [self.phase.sizes(0, self.step.controls(law, place), 0, one)[self._fixed, :] for place in places]
+        fixed = ca.Function("fixed", [law, one], [ca.horzcat(*values)]).map(n)(C, s)
+        entries, least = ca.vertsplit(pick(extended, self.Q)), []
+        for chosen, slots, sizes, weights in (
+            (self.step.sized, self.S, pick(extended, self.A), self.step.weights),
+            (self._fixed, self.F, fixed, np.array(list(self._places.values()))),
+        ):
+            S = pick(extended, slots)
+            least.append(self.add_sizes(rows, sizes, S, chosen))
+            totals = S @ ca.vec(ca.DM(weights) @ h)
+            for k, total in zip(chosen, ca.vertsplit(totals), strict=True):
+                entries[self.phase.sized[k]] = total
+        return ca.vertcat(*entries), ca.vertcat(*least)
 
     def state_nodes(self) -> tuple[np.ndarray, np.ndarray]:
         return self._arrivals, self.mesh.places[self._shots][1:]
@@ -124,10 +132,13 @@ class ShootingPhase(PhaseWriter):
         arrivals = [ends[i] for i in self._shots[1:]]
         slots, values = [self._arrivals, self.R, self.Q], [*arrivals, *arrivals, q]
         if interior:
+            first = self.step.rows * len(self.step.points)
+            seen, sizes = ([one[part, :] for one in seen] for part in (slice(first), slice(first, None)))
             if len(self.W) > n * len(self.step.points):
                 D = self.step.end_gradient(states[:, -1], *self._inputs(extended, n - 1))
                 seen.append(D[:, :nx] @ ends[-1] + D[:, nx:] @ self._outer[n - 1])
-            slots, values = [*slots, self.Y, self.W], [*values, *(ends[i] for i in self.mesh.ends[1:-1] if len(self.Y)), *seen]
+            at_nodes = [ends[i] for i in self.mesh.ends[1:-1] if len(self.Y)]
+            slots, values = [*slots, self.Y, self.W, self.A], [*values, *at_nodes, *seen, *sizes]
         return self.layout.replaced(S, np.concatenate([part.ravel() for part in slots]), ca.vertcat(*values)), ends[n]
 
     def unpack(self, extended: np.ndarray) -> PhaseTrajectory:
@@ -151,7 +162,11 @@ class ShootingPhase(PhaseWriter):
         D, at_end = (np.array(one) for one in self._linearised(extended))
         # By the states before a step: the states after it, its integrals, and samples at its points, of which the first is its beginning.
         D = D.reshape(-1, n, self.step.inputs).swapaxes(0, 1)[:, :, :nx]
-        after, integrals, samples = D[:, :nx], D[:, nx : nx + nq], D[:, nx + nq :].reshape(n, points, rows, nx)
+        after, integrals, samples, sizes = np.split(D, np.cumsum([nx, nq, points * rows]), axis=1)
+        samples = samples.reshape(n, points, rows, nx)
+        of_sizes = self.of_sizes(multipliers, self.step.sized, n * self.A.shape[1]).reshape(n, -1)
+        weights = np.tile(multipliers.integrals, (n, 1))
+        weights[:, [phase.sized[k] for k in self.step.sized]] = 0.0
         seen = np.array([*multipliers.paths, *multipliers.peaks]).reshape(self.W.shape[::-1]).T
         of_samples, of_end = seen[: n * points].reshape(n, points, rows), seen[n * points :].ravel()
         falls = np.zeros((n, nx))
@@ -165,13 +180,14 @@ class ShootingPhase(PhaseWriter):
         for k in range(n - 1, -1, -1):
             end[k] = p
             of_inside = np.einsum("pr,prx->x", of_samples[k, 1:], samples[k, 1:])
-            begin[k] = p @ after[k] + multipliers.integrals @ integrals[k] + of_inside
+            begin[k] = p @ after[k] + weights[k] @ integrals[k] + of_sizes[k] @ sizes[k] + of_inside
             p = begin[k] + falls[k] + of_samples[k, :1].ravel() @ samples[k, :1].reshape(-1, nx)
         s = extended[self.layout.index(self.ends.statics)]
-        ends = []
+        ends, densities = [], np.zeros((n, len(phase.sized)))
+        densities[:, self.step.sized] = of_sizes.reshape(self.A.shape).sum(axis=1) / np.diff(flown.state.edges)[:, None]
         for tau, costates in ((-1.0, begin), (1.0, end)):
             x, u = (piece(np.array([tau]))[:, 0] for piece in (flown.state.on_elements, flown.controls_on_elements))
-            by_x, own = slopes(phase, x, u, flown.state.times(np.array([tau]))[:, 0], s, multipliers.integrals)
+            by_x, own = slopes(phase, x, u, flown.state.times(np.array([tau]))[:, 0], s, np.hstack([weights, densities]))
             ends.append(-(np.einsum("kij,kj->ki", by_x, costates) + own))
         return Adjoint(_hermite(flown.state.edges, begin, end, *ends))
 
@@ -223,13 +239,13 @@ class ShootingPhase(PhaseWriter):
         symbols = chain.mx_in()
         return ca.Function(CHAIN, symbols, chain.call(symbols))
 
-    def _propagated(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
-        """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points)."""
+    def _propagated(self, initial: ca.MX, *inputs: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
+        """States (nx, n) after each of n steps, integrals over all of them, samples (rows, n points), sizes."""
         nx = len(self.phase.states)
-        y, samples = self._chain(inputs[1].shape[1])(self._begun(initial), *inputs)
-        return y[:nx, :], y[nx:, -1], samples
+        y, samples, sizes = self._chain(inputs[1].shape[1])(self._begun(initial), *inputs)
+        return y[:nx, :], y[nx:, -1], samples, sizes
 
-    def _propagated_shots(self, extended: ca.MX) -> list[tuple[ca.MX, ca.MX, ca.MX]]:
+    def _propagated_shots(self, extended: ca.MX) -> list[tuple[ca.MX, ca.MX, ca.MX, ca.MX]]:
         """The results of `_propagated` for each shot, from its own initial states."""
         k, left = self.law.degree + 1, self.layout.pick(extended, self.B[:-1])
         C, *others = self._inputs(extended)
@@ -250,23 +266,23 @@ class ShootingPhase(PhaseWriter):
         """(extended vector, outputs of that chain) -> (the same with the states and hidden quantities, final states)."""
         nx, n, step = len(self.phase.states), self.mesh.steps, self.step.forward
         extended = ca.MX.sym("extended", self.layout.total)
-        y, samples = (ca.MX.sym(f"result{i}", step.size1_out(i), step.size2_out(i) * n) for i in (0, 1))
-        filled = self.layout.replaced(extended, *self._hidden(extended, y[:nx, :], y[nx:, -1], samples))
+        y, *seen = (ca.MX.sym(f"result{i}", step.size1_out(i), step.size2_out(i) * n) for i in range(step.n_out()))
+        filled = self.layout.replaced(extended, *self._hidden(extended, y[:nx, :], y[nx:, -1], *seen))
         filled = self.layout.replaced(filled, self._arrivals, ca.vec(y[:nx, (self._shots[1:] - 1).tolist()]))
-        return ca.Function("after", [extended, y, samples], [ca.densify(filled), ca.densify(y[:nx, -1])])
+        return ca.Function("after", [extended, y, *seen], [ca.densify(filled), ca.densify(y[:nx, -1])])
 
     def _begun(self, initial: ca.MX) -> ca.MX:
         """States, and integrals of nothing yet."""
         return ca.vertcat(initial, ca.DM.zeros(len(self.Q), 1))
 
-    def _hidden(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX) -> tuple[np.ndarray, ca.MX]:
-        """Slots and values of the hidden quantities of a propagation: states (nx, N) after each step, integrals, samples."""
+    def _hidden(self, extended: ca.MX, states: ca.MX, q: ca.MX, samples: ca.MX, sizes: ca.MX) -> tuple[np.ndarray, ca.MX]:
+        """Slots and values of the hidden quantities of a propagation: states (nx, N) after each step, integrals, samples, sizes."""
         if len(self.W) > samples.shape[1]:
             samples = ca.horzcat(samples, self.step.at_end(states[:, -1], *self._inputs(extended, self.mesh.steps - 1)))
         at_nodes = states[:, (self.mesh.ends[1:-1] - 1).tolist()] if len(self.Y) else ca.MX(0, 1)
         right = states[:, (self._shots[1:] - 1).tolist()]
-        slots = np.concatenate([part.ravel() for part in (self.R, self.Y, self.Q, self.W)])
-        return slots, ca.veccat(right, at_nodes, q, samples)
+        slots = np.concatenate([part.ravel() for part in (self.R, self.Y, self.Q, self.W, self.A)])
+        return slots, ca.veccat(right, at_nodes, q, samples, sizes)
 
     @cached_property
     def _outer(self) -> list[ca.DM]:
@@ -291,12 +307,6 @@ def _hermite(edges: np.ndarray, begin: np.ndarray, end: np.ndarray, first: np.nd
     begin, end, first, last = (one[:, None, :] for one in (begin, end, first, last))
     values = (1 + 2 * t) * (1 - t) ** 2 * begin + t**2 * (3 - 2 * t) * end + h * t * (1 - t) * ((1 - t) * first - t * last)
     return PiecewisePolynomial(edges, values, "lobatto")
-
-
-def _sized_by_controls(phase: CompiledPhase) -> list[int]:
-    """Which of the phase's `sizes` depend on nothing that varies in time but controls."""
-    varying = {row for i in (0, 2) for row in phase.sizes.jac_sparsity(0, i).row()}
-    return [k for k in range(len(phase.sized)) if k not in varying]
 
 
 def _by_step(values: ca.MX, k: int, n: int) -> ca.MX:

@@ -38,6 +38,12 @@ class Tableau:
         return tuple(float(sum(row)) for row in self.A)
 
     @property
+    def quadrature(self) -> dict[float, float]:
+        """Weights of what depends on time alone, by places in the step."""
+        weights = {place: sum(b for c, b in zip(self.c, self.b, strict=True) if c == place) for place in self.c}
+        return {place: weight for place, weight in weights.items() if weight}
+
+    @property
     def matrix(self) -> np.ndarray:
         """A in full, (s, s), strictly lower triangular."""
         full = np.zeros((len(self.b), len(self.b)))

@@ -23,24 +23,28 @@ class RungeKuttaStep:
     """A step as Functions of its inputs: the states at its beginning, the coefficients of the controls, its start and length, and s.
 
     Integrals are quadrature states of the same method. A point inside the step is reached by a step of the same method of that part of its
-    length, which is as accurate as the step itself.
+    length, which is as accurate as the step itself. The absolute values and roots of integrals that depend on states or time are sampled
+    at the stages of the method, whose `weights` (stages,) are not 0.
     """
 
     def __init__(self, scheme: Tableau, degree: int, points: Sequence[float], phase: CompiledPhase) -> None:
         self.scheme, self.degree, self.points, self.phase = scheme, degree, tuple(points), phase
         self.rows = len(phase.paths) + phase.peaks.size1_out(0)
-        functions = (phase.dynamics, phase.integrands, phase.path, phase.peaks)
+        varying = {row for i in (0, 2) for row in phase.sizes.jac_sparsity(0, i).row()}
+        self.sized, self.weights = sorted(varying), np.array([b for b in scheme.b if b])
+        functions = (phase.dynamics, phase.integrands, phase.path, phase.peaks, phase.sizes)
         self.symbolic = all(expanded(function).is_a("SXFunction") for function in functions)
         nx, nu = len(phase.states), len(phase.controls)
         self.inputs = nx + nu * (degree + 1) + 2 + phase.dynamics.size1_in(3)
 
     @cached_property
     def forward(self) -> ca.Function:
-        """(y, C, start, h, s) -> (y after the step, samples (rows, points) in the order of time); y are states and integrals so far."""
+        """(y, C, start, h, s) -> (y after the step, samples (rows, points) in the order of time, sizes (`sized`, stages)); y are states and
+        integrals so far."""
         nx, nq = len(self.phase.states), self.phase.integrands.size1_out(0)
         y, others = self._kind.sym("y", nx + nq), self._symbols()
-        after, samples = self._whole(y[:nx, :], *others)
-        return self._function("step", [y, *others], [ca.vertcat(after[:nx, :], y[nx:, :] + after[nx:, :]), samples])
+        after, samples, sizes = self._whole(y[:nx, :], *others)
+        return self._function("step", [y, *others], [ca.vertcat(after[:nx, :], y[nx:, :] + after[nx:, :]), samples, sizes])
 
     @property
     def plain(self) -> bool:
@@ -60,10 +64,10 @@ class RungeKuttaStep:
         return self._function("inside", [x, *others], [ca.horzcat(*(self._reached(x, float(place), *others) for place in places))])
 
     def gradient(self, *, samples: bool) -> ca.Function:
-        """(x, C, start, h, s) -> derivatives (results, inputs) of states, integrals [and samples, point after point]."""
+        """(x, C, start, h, s) -> derivatives (results, inputs) of states, integrals [samples, point after point, sizes likewise]."""
         x, others = self._kind.sym("x", len(self.phase.states)), self._symbols()
-        after, values = self._whole(x, *others)
-        results = ca.vertcat(after, ca.vec(values)) if samples else after
+        after, *values = self._whole(x, *others)
+        results = ca.vertcat(after, *map(ca.vec, values)) if samples else after
         return self._function("gradient", [x, *others], [ca.jacobian(results, ca.veccat(x, *others))])
 
     @cached_property
@@ -84,12 +88,13 @@ class RungeKuttaStep:
     def _function(self, name: str, inputs: list[Any], outputs: list[Any]) -> ca.Function:
         return ca.Function(name, inputs, [ca.densify(output) for output in outputs], {"cse": True})
 
-    def _whole(self, x: Any, C: Any, start: Any, h: Any, s: Any) -> tuple[Any, Any]:
-        """States after the step and integrals over it; samples."""
-        nx = len(self.phase.states)
+    def _whole(self, x: Any, C: Any, start: Any, h: Any, s: Any) -> tuple[Any, Any, Any]:
+        """States after the step and integrals over it; samples; sizes."""
+        nx, sizes = len(self.phase.states), []
 
         def rates(c: float, y: Any) -> Any:
             inputs = y[:nx, :], self.controls(C, c), start + c * h, s
+            sizes.append(self.phase.sizes(*inputs)[self.sized, :])
             return ca.vertcat(self.phase.dynamics(*inputs), self.phase.integrands(*inputs))
 
         after, _ = self.scheme.step(rates, ca.vertcat(x, self._kind.zeros(self.phase.integrands.size1_out(0))), h)
@@ -97,7 +102,8 @@ class RungeKuttaStep:
             self._sample(after[:nx, :] if place == 1.0 else self._reached(x, place, C, start, h, s), C, place, start, h, s)
             for place in self.points
         ]
-        return after, ca.horzcat(self._kind(self.rows, 0), *columns)
+        counted = [column for column, b in zip(sizes, self.scheme.b, strict=True) if b]
+        return after, ca.horzcat(self._kind(self.rows, 0), *columns), ca.horzcat(*counted)
 
     def _reached(self, x: Any, place: float, C: Any, start: Any, h: Any, s: Any) -> Any:
         """States at a place in [0, 1]."""
