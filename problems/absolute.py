@@ -35,6 +35,21 @@ def absolute_terms(expr: ca.MX) -> list[tuple[float, ca.MX]]:
     return found
 
 
+def branches(expr: ca.MX) -> list[ca.MX]:
+    """Expressions of which `expr` is the greatest, for each absolute value, or greater one of two, among its terms; else `expr` itself."""
+    found: list[ca.MX] = [ca.MX(0)]
+    for factor, node in terms(expr):
+        own = [node]
+        if factor > 0 and node.is_op(ca.OP_FABS):
+            own = [node.dep(0), -node.dep(0)]
+        elif factor > 0 and node.is_op(ca.OP_FMAX):
+            own = [*branches(node.dep(0)), *branches(node.dep(1))]
+        if len(found) * len(own) > 8:
+            own = [node]  # as it is: their number doubles with each
+        found = [whole + _times(factor, one) for whole in found for one in own]
+    return found if len(found) > 1 else [expr]
+
+
 def terms(expr: ca.MX) -> list[tuple[float, ca.MX]]:
     """Factors and scalar expressions, none of them a sum, the sum of whose products is `expr`."""
     found: list[tuple[float, ca.MX]] = []

@@ -243,6 +243,10 @@ class CompiledPhase(Deriving):
     finals: ca.Function
     integrands: ca.Function
     peaks: ca.Function
+    peak_parts: ca.Function
+    """Expressions without kinks, the greatest of which peaks are, ..."""
+    peak_of: tuple[int, ...]
+    """... and the row of `peaks` that each of them belongs to."""
     sizes: ca.Function
     """Expressions whose absolute values, or roots, are integrands, ..."""
     sized: tuple[int, ...]

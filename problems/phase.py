@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from . import checks
-from .absolute import absolute_terms, radicand
+from .absolute import absolute_terms, branches, radicand
 from .compiled import CompiledPhase, Limit, Variable, vector_function
 from .switching import COMPARISONS, at_time, corners, same, sides, switching, value_at
 
@@ -342,6 +342,8 @@ class Phase:
         roots = {row: inner for row, inner in enumerate(map(radicand, integrands)) if inner is not None}
         sizes = roots | {row: expr.dep(0) for row, expr in enumerate(integrands) if expr.is_op(ca.OP_FABS)}
 
+        parts = [branches(expr) for _, expr in self._quantities["peak"]]
+
         varying = [*self._varying().values(), *integrands, *(expr for _, expr in self._quantities["peak"])]
         fixed = all(lower == upper for lower, upper in (self._t0_range, self._tf_range))
 
@@ -363,6 +365,8 @@ class Phase:
             finals=function("finals", [expr for _, expr in self._quantities["final"]]),
             integrands=function("integrands", integrands),
             peaks=function("peaks", [expr for _, expr in self._quantities["peak"]]),
+            peak_parts=function("peak_parts", [one for own in parts for one in own]),
+            peak_of=tuple(k for k, own in enumerate(parts) for _ in own),
             sizes=function("sizes", list(sizes.values())),
             sized=tuple(sizes),
             switching=switching(groups, varying, [self.time, self.t0, self.tf]),

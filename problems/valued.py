@@ -227,7 +227,7 @@ def _with_parameters(phase: CompiledPhase, own: int, more: int) -> CompiledPhase
         value = function.call([x, u, t, s[: 2 + own]], True, False)
         return ca.Function(function.name(), [x, u, t, s], value, function.name_in(), function.name_out())
 
-    names = ("dynamics", "path", "initials", "finals", "integrands", "peaks", "sizes")
+    names = ("dynamics", "path", "initials", "finals", "integrands", "peaks", "peak_parts", "sizes")
     functions: dict[str, Any] = {name: widened(getattr(phase, name)) for name in names}
     return replace(phase, **functions, switching=None)
 

@@ -278,13 +278,12 @@ class Assembly:
         s = pick(extended, writer.ends.statics)
         first, last = pick(extended, writer.ends.initial), pick(extended, writer.ends.final)
         peak = pick(extended, peaks)
-        for k in range(len(peaks)):
-            samples = written.peak_samples[k, :]
+        for samples, k in zip(ca.vertsplit(written.peak_samples), phase.peak_of, strict=True):
             scale = self.layout.variables[peaks[k]].scale
             rows.add(samples - peak[k], -np.inf, 0, scale, f"peak of '{phase.name}'", propagated=True, of=(phase.name, "peak"))
         (initials,) = rows.at_points(phase.initials, first, written.first_control, s[0], s)
         (finals,) = rows.at_points(phase.finals, last, written.last_control, s[1], s)
-        largest = [ca.mmax(written.peak_samples[k, :]) for k in range(len(peaks))]
+        largest = [ca.mmax(written.peak_samples[[i for i, of in enumerate(phase.peak_of) if of == k], :]) for k in range(len(peaks))]
         q = ca.vertcat(s[0], s[1], initials, finals, written.integrals, peak)
         return q, ca.vertcat(*largest) if largest else ca.MX(0, 1), written.magnitudes
 

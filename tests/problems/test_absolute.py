@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from problems.absolute import absolute_terms
+from problems.absolute import absolute_terms, branches
 
 U, V, X = (ca.MX.sym(name) for name in "uvx")
 W = ca.vertcat(U, V)
@@ -44,6 +44,26 @@ def test_terms_are_found_and_add_up_to_the_integrand(spelling):
 def test_others_stay_as_they_are(expr):
     ((factor, term),) = absolute_terms(expr)
     assert factor == 1.0 and term is expr
+
+
+@pytest.mark.parametrize(
+    ("expr", "count"),
+    [
+        (ca.fabs(U), 2),
+        (X + 3 * ca.fabs(U - V) + ca.fabs(X), 4),
+        (ca.fmax(ca.fabs(U), X) / 2, 3),
+        (sum((ca.fabs(U + k) for k in range(40)), X), 8),
+        (X - ca.fabs(U), 1),
+        (X * ca.fabs(U), 1),
+    ],
+)
+def test_a_peak_is_the_greatest_of_smooth_branches(expr, count):
+    found = branches(expr)
+    both = ca.Function("both", [U, V, X], [expr, ca.mmax(ca.vertcat(*found))])
+    assert len(found) == count
+    for point in np.random.default_rng(0).uniform(-2, 2, (20, 3)):
+        stated, greatest = (float(value) for value in both(*point))
+        assert greatest == pytest.approx(stated, rel=1e-14, abs=1e-14)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Integrals of absolute values: smooth for gradient tools where they are minimised or bounded above, the same numbers everywhere else."""
+"""Integrals and peaks of absolute values: smooth for gradient tools where they are minimised or bounded above, else the same numbers."""
 
 import casadi as ca
 import numpy as np
@@ -159,3 +159,37 @@ def test_a_target_that_moves_is_met_and_followed(method):
     point = optimize(least_deviation(lambda t: 0.5 * ca.sin(t)), method, starts=1)
     right = meets - 0.5 * meets**2 + 0.5 * np.cos(meets) - 0.5
     assert point.status == "converged" and point.objectives["deviation"] == pytest.approx(right, abs=2e-3)
+
+
+def test_the_least_turn_rate_that_arrives_in_time():
+    """Jennings: an arc, then its tangent through the origin; the rate is that at which both take as long as there is."""
+    problem = Problem("turn")
+    phase = problem.phase("drive", t0=0.0, tf=5.0)
+    heading = phase.state("heading", bounds=(-7, 7), initial=np.pi / 2)
+    for axis, start in (("x", 4.0), ("y", 0.0)):
+        phase.state(axis, bounds=(-6, 6), initial=start, final=0)
+    u = phase.control("u", bounds=(-2, 2))
+    phase.dynamics(heading=u, x=ca.cos(heading), y=ca.sin(heading))
+    problem.minimize("rate", phase.peak(ca.fabs(u)))
+
+    def length(rate: float) -> float:
+        radius, to_centre = 1 / rate, 4 - 1 / rate
+        return radius * (np.pi - np.arccos(radius / to_centre)) + np.sqrt(to_centre**2 - radius**2)
+
+    point = optimize(problem, DFET(10, 3), starts=6)
+    assert point.status == "converged"
+    assert point.objectives["rate"] == pytest.approx(brentq(lambda rate: length(rate) - 5.0, 0.501, 2.0), abs=1e-4)
+
+
+@pytest.mark.parametrize("integrand", [ca.fabs, lambda u: ca.fmax(u, -u)], ids=["fabs", "fmax"])
+def test_the_least_torque_that_swings_a_pendulum_up(integrand):
+    problem = Problem("swing")
+    phase = problem.phase("swing", t0=0.0, tf=8.0)
+    angle = phase.state("angle", bounds=(-12, 12), initial=0, final=np.pi)
+    rate = phase.state("rate", bounds=(-8, 8), initial=0, final=0)
+    u = phase.control("u", bounds=(-2, 2))
+    phase.dynamics(angle=rate, rate=u - ca.sin(angle))
+    problem.minimize("torque", phase.peak(integrand(u)))
+    point = optimize(problem, MultipleShooting(40), starts=3)
+    # DFET has 0.47196 on meshes that it refines.
+    assert point.status == "converged" and point.objectives["torque"] == pytest.approx(0.472, abs=1e-3)

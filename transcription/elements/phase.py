@@ -117,7 +117,7 @@ class ElementsPhase(PhaseWriter):
             chosen = [k for k, limit in enumerate(phase.paths) if (limit.lower == limit.upper) is equality]
             paths |= zip(chosen, ca.vertsplit(samples(phase.path, chosen, tau)), strict=True)
         self.add_paths(rows, [paths[k] for k in range(len(phase.paths))])
-        peaks = samples(phase.peaks, list(range(phase.peaks.size1_out(0))), tables.dense)
+        peaks = samples(phase.peak_parts, list(range(len(phase.peak_of))), tables.dense)
         ends = self._controls_at(extended, np.array([-1.0, 1.0]))
         totals = integrands @ ca.DM(np.tile(tables.weights, self.n))
         S = pick(extended, self.S)

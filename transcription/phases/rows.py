@@ -139,7 +139,7 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What objectives and constraints see of a phase, as columns; samples of peaks (peaks, k); least values of `magnitudes`."""
+    """What objectives and constraints see of a phase, as columns; samples of parts of peaks (parts, k); least values of `magnitudes`."""
 
     first_control: ca.MX
     last_control: ca.MX

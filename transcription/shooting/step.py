@@ -29,10 +29,10 @@ class RungeKuttaStep:
 
     def __init__(self, scheme: Tableau, degree: int, points: Sequence[float], phase: CompiledPhase) -> None:
         self.scheme, self.degree, self.points, self.phase = scheme, degree, tuple(points), phase
-        self.rows = len(phase.paths) + phase.peaks.size1_out(0)
+        self.rows = len(phase.paths) + len(phase.peak_of)
         varying = {row for i in (0, 2) for row in phase.sizes.jac_sparsity(0, i).row()}
         self.sized, self.weights = sorted(varying), np.array([b for b in scheme.b if b])
-        functions = (phase.dynamics, phase.integrands, phase.path, phase.peaks, phase.sizes)
+        functions = (phase.dynamics, phase.integrands, phase.path, phase.peak_parts, phase.sizes)
         self.symbolic = all(expanded(function).is_a("SXFunction") for function in functions)
         nx, nu = len(phase.states), len(phase.controls)
         self.inputs = nx + nu * (degree + 1) + 2 + phase.dynamics.size1_in(3)
@@ -116,7 +116,7 @@ class RungeKuttaStep:
     def _sample(self, x: Any, C: Any, place: float, start: Any, h: Any, s: Any) -> Any:
         """Path constraints and peaks (rows,) at a place where the states are x."""
         inputs = x, self.controls(C, place), start + place * h, s
-        return ca.vertcat(self.phase.path(*inputs), self.phase.peaks(*inputs))
+        return ca.vertcat(self.phase.path(*inputs), self.phase.peak_parts(*inputs))
 
     def controls(self, C: Any, place: float) -> Any:
         """Controls (nu,) at a place in [0, 1], within the bounds of those that are periodic."""
