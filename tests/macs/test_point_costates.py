@@ -129,6 +129,31 @@ def test_switching_functions_change_sign_where_controls_do(name, switches):
     assert np.count_nonzero(np.diff(high)) == switches
 
 
+@pytest.mark.parametrize("name", ["rocket", "catalyst_mixing", "jacobson"])
+def test_switching_functions_vanish_on_singular_arcs(name):
+    slope, u = switching(name, optimize(load(f"standard/{name}"), starts=1))
+    low, high = np.ptp(u) * np.array([0.01, -0.01]) + [u.min(), u.max()]
+    singular = (u > low) & (u < high)
+    assert singular.sum() > 10 and np.abs(slope[singular]).max() < 1e-3 * np.abs(slope).max()
+
+
+def test_costates_of_a_harvest_are_those_of_its_closed_form():
+    """Fish grow by x (1 - x): none are caught up to x = 1/2, then as many as grow, then all that can be. H = -1/4 gives the costate on both
+    arcs without, p = (1/4 - u) / (u - x (1 - x)), and it is -1 on the singular one, as each fish in the sea is worth one caught."""
+    problem = Problem("harvest")
+    sea = problem.phase("sea", t0=0, tf=10)
+    x, u = sea.state("x", bounds=(0.01, 2), initial=0.1, final=0.2), sea.control("u", bounds=(0, 0.5))
+    sea.dynamics(x=x * (1 - x) - u)
+    problem.maximize("catch", sea.integral(u))
+    point = optimize(problem, starts=1)
+    first, last, time = np.log(9.0), 10 - 2 * np.arctan(0.6), point.trajectory["sea"].time
+    x = np.where(time < first, 1 / (1 + 9 * np.exp(-time)), 0.5 - 0.5 * np.tan(np.maximum(time - last, 0) / 2))
+    u = np.where(time < first, 0.0, 0.5)
+    expected = np.where((time < first) | (time > last), (0.25 - u) / (u - x * (1 - x)), -1.0)
+    assert point.costates["sea"]["x"] == pytest.approx(expected, abs=1e-3)
+    assert point.hamiltonian["sea"] == pytest.approx(np.full(len(time), -0.25), abs=1e-3)
+
+
 def test_where_nothing_is_feasible_there_are_none():
     problem = Problem("too far")
     run = problem.phase("run", t0=0, tf=1)

@@ -73,6 +73,9 @@ def test_a_control_that_is_not_the_best_shows_by_what_it_loses(fraction, method)
     (gain,) = gains(nlp.problem, off, found, quantities, np.ones(1)).values()
     lost = (40 * fraction) ** 2 / 2
     assert 0.7 * lost < gain.amounts.sum() <= lost * (1 + 1e-9)
+    _, _, others, _ = optimum(rest_to_rest(), DFET(5, 3))
+    (same,) = gains(nlp.problem, off, others, quantities, np.ones(1)).values()
+    assert same.amounts == pytest.approx(gain.amounts, rel=1e-5), "costates may have elements of their own"
 
 
 def hidden_pulse(low: float, high: float) -> Problem:

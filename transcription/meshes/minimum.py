@@ -84,7 +84,7 @@ def _gain(
     """The gain of other controls in one phase, from its costates and the weights of its integrands."""
     shape = len(trajectory.state.edges) - 1, len(TAU)
     x, u, t, s = trajectory.sampled(TAU, parameters)
-    adjoint = costates.on_elements(TAU).reshape(len(t), -1)
+    adjoint = costates(t)  # they may have other pieces
 
     def under(controls: np.ndarray) -> np.ndarray:
         return hamiltonian(phase, adjoint, weights, x, controls, t, s)
