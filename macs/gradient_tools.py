@@ -311,9 +311,8 @@ class _Job:
             try:
                 own = None
                 if not self.fixed:
-                    given, part = partial(beginning, self._terms.start), SEARCH.optimum if ends else SEARCH.ends
-                    told = verify or VERIFY, self.solves.tolerance, show, given, self._terms.count
-                    chosen = search_meshes(self._statement, *told, part)
+                    given, told = partial(beginning, self._terms.start), (verify or VERIFY, self.solves.tolerance, show)
+                    chosen = search_meshes(self._statement, *told, given, self._terms.count)
                     self.solves.counts, self._stopping = chosen.counts, dict(chosen.rules)
                     self.ends = chosen.ends
                     own = chosen.ends if ends and chosen.ends and len(chosen.ends) == len(self.problem.goals) else None

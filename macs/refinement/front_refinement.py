@@ -93,7 +93,9 @@ class FrontRefinement:
         first: Meshed | None = None,
     ) -> None:
         self.front, self.wanted = front, wanted
-        self.good = np.flatnonzero(front.status == CONVERGED)
+        # Beside verified points, one that a simulation refutes is no end.
+        known = front.verified if front.verified[slice(None) if chosen is None else list(chosen)].all() else True
+        self.good = np.flatnonzero((front.status == CONVERGED) & known)
         self.chosen = [i for i in self.good.tolist() if chosen is None or i in set(chosen)]
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])), max_iterations)
         self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, enough=enough, more=more)

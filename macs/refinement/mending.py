@@ -46,6 +46,7 @@ class MendingLimits:
     each: float = 100.0  # iterations for each point that is missed that are allowed even then: enough for one more mesh
     # Work that is always allowed, about a second, since a mesh that is coarse for its search is refined to many times its variables.
     least: float = 2e5
+    ends: float = 0.25  # work on verified ends that other controls would improve, as a part of what the front cost
     slightly: float = 0.1  # excess over limits, in their scales, up to which a point is rather moved inside of them
     loss: float = 5e-3  # what that may cost in each objective, in ranges of the front
     starts: int = 2  # verified points from which a solve for a further one is tried
@@ -74,7 +75,7 @@ def mended(
     with working(time_limit, progress) as (show, interrupts):
         job = _Mending(points, verify, show, ends)
         again = job.resolve_unverified(fine)
-        joined = job.strong(job.with_ends(again))
+        joined = job.strong(again)
         if joined is job.points and joined.verified.all() and len(joined) >= size:
             return _separate(joined[best_rows(joined)]).sorted()
         kept = _separate(joined[best_rows(joined, verify * objective_scales(joined))])
@@ -142,9 +143,17 @@ class _Mending:
             # What costs least comes first: the mesh and its program are there.
             again = tried = self._as_simulated(self._inside(again, _slightly_outside(again, self.verify), MENDING.loss), SEARCH.passable)
         again = self._refined(again, self._meshed(again, again.was_simulated & ((fine is not None) | ~again.verified)), fine)
-        again = self._refined(again, self._meshed(again, again.verified & (again.gain > self._gain)))
+        again = self.with_ends(again)
+        gaining, ends = self._meshed(again, again.verified & (again.gain > self._gain)), list[int]()
+        if self.points.stats["evaluations"] and gaining:
+            # Where work is limited, the ends come first.
+            good = np.flatnonzero(again.verified)
+            ends = [i for i in gaining if i in good[extremes(again.simulated_F[good])]]
+            again = self._refined(again, ends, None, MENDING.ends)
+        again = self._refined(again, [i for i in gaining if i not in ends])
         # On a finer mesh, too, a point may exceed limits between nodes, and by less.
-        moved = [i for i in _slightly_outside(again, self.verify) if again.trajectories[i] is not tried.trajectories[i]]
+        old = set(map(id, tried.trajectories))
+        moved = [i for i in _slightly_outside(again, self.verify) if id(again.trajectories[i]) not in old]
         again = self._as_before(self._inside(again, moved, MENDING.loss))
         beyond = again.was_simulated & (again.simulated_violation > self.verify) & (again.status == CONVERGED)
         again = self._inside(again, sorted(set(np.flatnonzero(beyond).tolist()) - set(self._meshed(again, beyond))))
@@ -168,11 +177,11 @@ class _Mending:
         return self.marked(_inside_limits(points, rows, self.verify, loss))
 
     def with_ends(self, points: Points) -> Points:
-        """The points with those verified ends that are better in an objective than all of them, by more than the tolerance."""
+        """The points with those verified ends that are better in an objective than all of them, by more than optima may miss."""
         ends, good = self.ends, points.simulated_F[points.verified]
         if ends is None:
             return points
-        better = ends.verified & (ends.simulated_F < good.min(axis=0, initial=np.inf) - ends.tolerances).any(axis=1)
+        better = ends.verified & (ends.simulated_F < good.min(axis=0, initial=np.inf) - self._gain * objective_scales(ends)).any(axis=1)
         if not better.any():
             return points
         return Points.concatenate([points, ends[better]]).replace(stats=points.stats, solver=points.solver)
@@ -244,9 +253,14 @@ class _Mending:
         )
 
     def _as_before(self, points: Points) -> Points:
-        """The points, with the original in place of each that was verified originally and no longer is, or lost more than its tolerance."""
-        worse = ((points.simulated_F - self.points.simulated_F) / objective_scales(self.points)).max(axis=1) > self.verify
-        unsure = np.flatnonzero((~points.verified | worse) & (self.points.verified | ~self.points.was_simulated)).tolist()
+        """The points, with the original in place of each that was verified originally and no longer is, or lost more than its tolerance: an
+        end of the front in its own objective."""
+        before = self.points
+        lost = (points.simulated_F[: len(before)] - before.simulated_F) / objective_scales(before)
+        ends = extremes(before.F)
+        own = ~np.isin(np.arange(len(before)), ends)[:, None] | (ends == np.arange(len(before))[:, None])
+        worse = np.where(own, lost, 0.0).max(axis=1) > self.verify
+        unsure = np.flatnonzero((~points.verified[: len(before)] | worse) & (before.verified | ~before.was_simulated)).tolist()
         lost = [i for i in unsure if points.trajectories[i] is not self.points.trajectories[i]]
         if not lost:
             return points
@@ -260,8 +274,9 @@ class _Mending:
         return [i for i in np.flatnonzero(rows).tolist() if isinstance(from_dict(points[i].transcription or {}), Meshed)]
 
     @_unless_stopped
-    def _refined(self, points: Points, rows: list[int], fine: Meshed | None = None) -> Points:
-        """The points with some of them on a `fine` mesh, or finer ones of their own, as far as the work allows; simulated."""
+    def _refined(self, points: Points, rows: list[int], fine: Meshed | None = None, more: float = 0.0) -> Points:
+        """The points with some of them on a `fine` mesh, or finer ones of their own, as far as the work allows, and `more` as a part of the
+        front's; simulated."""
         if not rows:
             return points
         limits, gaining = MENDING.part * self.verify, fine is None and bool(points.verified[rows].all())
@@ -274,6 +289,7 @@ class _Mending:
         # Where only objectives are off, those of the simulation are known, too.
         blurred = fine is None and bool(feasible_as_simulated(points, self.verify)[rows].all())
         most = self._most_work(points, 0 if gaining else len(rows), fine, 0.0 if blurred or gaining else MENDING.share)
+        most += more * self._work
         job = FrontRefinement(points, wanted, MENDING.meshes, rows, most, self.programs, enough, MENDING.patience, first=fine)
         job.go(self.show)
         again = self.marked(job.points(0.0, ""))

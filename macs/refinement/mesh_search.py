@@ -51,8 +51,7 @@ FINEST: Meshed = DFET(20, 3)
 class MeshSearchLimits:
     """Limits of the search for meshes, and tolerances of an optimum."""
 
-    optimum: float = 0.1  # what a single optimum may miss, as a part of what points may
-    ends: float = 1.0  # the same for the ends of a front, on the mesh of a search: points get meshes of their own
+    optimum: float = 0.1  # what an optimum may miss, as a part of what points may
     meshes: int = 8  # most meshes of one optimum, beside the coarse one
     share: float = 0.5  # work of other starts on another mesh, and of refining what they find, as a part of that before
     passable: float = 5.0  # error, in tolerances, with which other meshes are tried only as long as that takes little work
@@ -403,17 +402,16 @@ def search_meshes(
     show: Callable[[str], None] = lambda words: None,
     given: Callable[[NLP], np.ndarray | None] | None = None,
     starts: int | None = None,
-    part: float = SEARCH.ends,
 ) -> SearchMeshes:
     """The problem's own default transcription; without one, those found from the ends of the front, which are sought on coarse meshes and
-    then on finer ones, until a simulation agrees and a finer mesh changes no more than this part of what points may miss."""
+    then on finer ones, until a simulation agrees and a finer mesh changes no more than a part of what points may miss."""
     problem = statement.compile()
     if isinstance(statement, Problem) and statement.default_transcription is not None:
         return SearchMeshes(stated(statement.default_transcription), None, Counts())
     if not differentiable(problem):
         return SearchMeshes(COARSE[0], None, Counts())
     show("ends of the front on coarse meshes")
-    limits, m = part * verify, len(problem.goals)
+    limits, m = SEARCH.optimum * verify, len(problem.goals)
     wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
     loop = MeshLoop(Programs(problem), GradientSolves(tolerance), wanted, SEARCH.meshes, m * WORK.most)
     tasks = [Scalarised.single(i, m) for i in range(m)]

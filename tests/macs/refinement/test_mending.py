@@ -1,5 +1,6 @@
 """Points that a simulation does not confirm are solved again; the ascent's least time has a closed form."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import casadi as ca
@@ -10,6 +11,7 @@ from smooth_problems import bryson_denham, time_against_effort
 
 from macs import MACS, NSGA2, Front, payoff, sweep
 from macs.fronts.builders import certified, from_vectors
+from macs.fronts.points import Points
 from macs.fronts.verification import verify
 from macs.fronts.verified import unmarked
 from macs.gradients.front_polish import KEPT_INSIDE
@@ -230,8 +232,32 @@ def test_what_a_point_wastes_without_any_effect_on_its_own_objective_is_saved():
     assert found.stats["gradient_solves"] <= wasteful.stats["gradient_solves"] + 4, "at most two solves for each end"
 
 
-def test_points_that_other_controls_would_better_are_solved_again(tmp_path) -> None:
-    """A cart from rest to rest, thrust on both sides: fuel against time is T - sqrt(T^2 - 4), with switches between elements' edges."""
+def test_an_end_that_is_known_better_replaces_that_of_the_front(monkeypatch) -> None:
+    """By more than a tenth of what points may miss, as exact as a payoff table is, where no work is left to solve it again."""
+    problem = two_sided_cart()
+    front, ends = sweep(problem, DFET(27, 3, basis="bernstein"), points=2, starts=1), payoff(problem)
+    off, spans = front.F.min(axis=0) - np.diag(ends.F), np.ptp(ends.F, axis=0)
+    assert front.verified.all() and 1e-4 < (off / spans).max() < 1e-3
+    monkeypatch.setattr(mending, "MENDING", replace(mending.MENDING, least=1.0))
+    searched = front.replace(stats=front.stats | {"evaluations": 1, "work": 1})
+    found = mending.mended(searched, 1e-3, ends=ends)
+    assert found.verified.all() and (found.F.min(axis=0) <= np.diag(ends.F) + 1e-4 * spans).all()
+
+
+def test_an_end_on_a_finer_mesh_may_lose_in_other_objectives(marked, mended) -> None:
+    """A point between the ends may not."""
+    known, quickest = marked[1:], mended[:1]
+    job = mending._Mending(known, 1e-3, print)
+    ahead = Points.concatenate([quickest, known[1:]]).replace(stats=known.stats)
+    assert (quickest.F[0] - known.F[0] > 0).tolist() == [False, True]
+    assert np.array_equal(job._as_before(ahead).F, ahead.F)
+    job.points = mended
+    beside = Points.concatenate([mended[:1], mended[:1], mended[2:]]).replace(stats=mended.stats)
+    assert np.array_equal(job._as_before(beside).F, mended.F)
+
+
+def two_sided_cart() -> Problem:
+    """From rest to rest, thrust on both sides: fuel against time is T - sqrt(T^2 - 4), with switches between elements' edges."""
     problem = Problem("cart")
     ride = problem.phase("ride", t0=0, tf=(2, 10))
     _, v = ride.state("x", bounds=(-1, 2), initial=0, final=1), ride.state("v", bounds=(-2, 2), initial=0, final=0)
@@ -239,6 +265,11 @@ def test_points_that_other_controls_would_better_are_solved_again(tmp_path) -> N
     ride.dynamics(x=v, v=forth - back)
     problem.minimize("time", ride.tf)
     problem.minimize("fuel", ride.integral(forth + back))
+    return problem
+
+
+def test_points_that_other_controls_would_better_are_solved_again(tmp_path) -> None:
+    problem = two_sided_cart()
 
     def off(front: Front) -> np.ndarray:
         time, fuel = front.objectives.T
