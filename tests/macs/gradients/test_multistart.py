@@ -97,23 +97,31 @@ def test_solves_for_times_at_their_bounds():
     assert solver.from_times(start, task, nlp.upper[nlp.times]).F[0] == pytest.approx(-1.0, abs=1e-6)
 
 
-def swing(tf: tuple[float, float] | float = (1.0, 20.0), cubic: float = 0.0, concave: bool = False) -> Problem:
-    """Two masses on springs brought to rest: time and effort; with a spring that is not linear, or a concave objective, if asked for."""
+def swing(tf: tuple[float, float] | float = (1.0, 20.0), cubic: float = 0.0, t0: tuple[float, float] | float = 0.0, **others) -> Problem:
+    """Two masses on springs brought to rest: time and effort, and other objectives of the phase; with a spring that is not linear, if asked
+    for."""
     problem = Problem("swing")
-    phase = problem.phase("phase", t0=0.0, tf=tf)
+    phase = problem.phase("phase", t0=t0, tf=tf)
     x, y, v, w = (phase.state(name, bounds=(-5, 5), initial=float(name == "x"), final=0) for name in "xyvw")
     u = phase.control("u", bounds=(-1, 1))
     phase.dynamics(x=v, y=w, v=y - x + cubic * x**3, w=x - y + u)
     problem.minimize("time", phase.tf)
     problem.minimize("effort", phase.integral(u**2))
-    if concave:
-        problem.minimize("gain", -phase.integral(u**2))
+    for name, objective in others.items():
+        problem.minimize(name, objective(phase))
     return problem
 
 
 def test_which_objectives_are_convex_for_a_given_time():
-    """A concave one is not, nor is any where rates are not linear, or where a place in a narrow valley is chosen."""
-    assert convex_objectives(DFET(4, 3).nlp(swing(concave=True))).tolist() == [True, True, False]
+    """A concave one is not, one that is not quadratic, and one with a kink; nor any where rates are not linear, two times are free, or
+    where a place in a narrow valley is chosen."""
+    others = {
+        "concave": lambda phase: -phase.integral(phase["u"] ** 2),
+        "steep": lambda phase: phase.integral(phase["u"] ** 4),
+        "kinked": lambda phase: -ca.fabs(phase.final(phase["x"])),
+    }
+    assert convex_objectives(DFET(4, 3).nlp(swing(**others))).tolist() == [True, True, False, False, False]
+    assert convex_objectives(DFET(4, 3).nlp(swing(t0=(0.0, 0.5)))).tolist() == [False] * 2
     assert convex_objectives(DFET(4, 3).nlp(swing(cubic=0.1))).tolist() == [False] * 2
     assert convex_objectives(DFET(1, 1).nlp(wells([1.0] * 3))).tolist() == [False, True]
 
