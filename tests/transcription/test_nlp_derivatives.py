@@ -125,7 +125,7 @@ def test_they_are_as_sparse(case):
 
 @pytest.mark.parametrize("method", [DFET(3, 2), Collocation(3, 2), MultipleShooting(3)])
 def test_which_objectives_are_linear(method):
-    """Against slopes at two places; and what is linear in all but one variable is not. By shooting with tables it may not show, of some or all."""
+    """Against slopes at two places; and what is linear in all but one variable is not. With tables, shooting shows some or none."""
     problem = everything()
     x, t0 = problem.phases["left"]["x"], problem.phases["left"].t0
     problem.minimize("mixed", 2 * problem.phases["last"].tf - t0)
