@@ -98,7 +98,8 @@ class Decide(GradientSolver):
                 return before.take([]).replace(message=f"{before.stats['stopped']} before the first choice")
             if limit is not None and (limit := limit - before.stats["wall_time"]) <= 0.0:
                 return before.take([]).replace(message="time limit before the first choice")
-        asked = Terms(known, self.starts, terms["seed"], terms["tolerance"], terms["verify"], MOST_ITERATIONS, limit, terms["progress"])
+        own = terms["seed"], terms["tolerance"], terms["verify"], MOST_ITERATIONS, limit, None, terms["progress"]
+        asked = Terms(known, self.starts, *own)
         ranges = None if self.ranges is None else _ranges(self.ranges)
         solver = DecisionSolver(problem, transcription, ranges, asked, resolves=self.mesh == "mended")
         found = solver.run(lambda: _choices(solver, preferences))

@@ -21,6 +21,7 @@ from .fronts.tables import front_html, front_table, headline
 from .fronts.verified import VERIFY, fixed_scales, simulated, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
+from .io.workers import Workers, processes
 from .refinement.front_refinement import refine_mesh
 from .refinement.mending import mended
 
@@ -95,6 +96,7 @@ class Front(Points):
         solves: int | None = None,
         verify: float | None = None,
         time_limit: float | None = None,
+        workers: Workers | None = None,
         progress: bool | None = None,
     ) -> Front:
         """The front with points solved again by gradients, from their trajectories, on other meshes.
@@ -141,6 +143,8 @@ class Front(Points):
             `verify` does. Default: no point is left out; points are marked if those of the front were.
         time_limit : float, optional
             Seconds after which the work ends with the results so far. Checked, like Ctrl-C, before each solve.
+        workers : int, "all" or Executor, optional
+            Processes that work side by side, see `optimize`.
         progress : bool, optional
             Show the progress on stderr. Default: on a terminal and in a notebook, from the third second on.
 
@@ -157,14 +161,15 @@ class Front(Points):
             For a black box, a problem that cannot be found, a transcription whose mesh cannot be refined, peaks without derivatives, and
             invalid arguments.
         """
-        if until is None:
-            marked = self if self.was_simulated.any() else self.verify()
-            return Front.of(mended(marked, marked.stats["verify"], time_limit, progress))
-        if isinstance(until, int | float):
-            refined = refine_mesh(unmarked(self), until, 12 if limit is None else limit, time_limit, progress, more)
-            return Front.of(refined).verify(self.stats.get("verify"))
-        found = Front.of(polished(self, until, solves, limit, verify, time_limit, progress))
-        return Front.of(verified(found, self.stats.get("verify") if verify is None else verify, fixed_scales(self)))
+        with processes(workers):
+            if until is None:
+                marked = self if self.was_simulated.any() else self.verify()
+                return Front.of(mended(marked, marked.stats["verify"], time_limit, progress))
+            if isinstance(until, int | float):
+                refined = refine_mesh(unmarked(self), until, 12 if limit is None else limit, time_limit, progress, more)
+                return Front.of(refined).verify(self.stats.get("verify"))
+            found = Front.of(polished(self, until, solves, limit, verify, time_limit, progress))
+            return Front.of(verified(found, self.stats.get("verify") if verify is None else verify, fixed_scales(self)))
 
     def refine_mesh(self, *, tolerance: float = 1e-7, limit: int = 12, more: bool = True, **limits: Any) -> Front:
         """Each point on a mesh of its own: `refine` until a tolerance."""
@@ -178,7 +183,7 @@ class Front(Points):
         """The points that a simulation did not confirm, solved again: `refine`."""
         return self.refine(**limits)
 
-    def verify(self, tolerance: float | None = VERIFY) -> Front:
+    def verify(self, tolerance: float | None = VERIFY, *, workers: Workers | None = None) -> Front:
         """The same points, simulated by an independent integrator, and marked by whether they are as they say.
 
         Points of a vector problem are evaluated again. Every solver and gradient tool does so at its end. A point is `verified` if nothing
@@ -192,6 +197,8 @@ class Front(Points):
         ----------
         tolerance : float or None
             None: the points are not simulated.
+        workers : int, "all" or Executor, optional
+            Processes that simulate side by side, see `optimize`.
 
         Returns
         -------
@@ -204,7 +211,8 @@ class Front(Points):
         ValueError
             For a tolerance that is not positive, and a problem that cannot be found.
         """
-        return verified(self, tolerance)
+        with processes(workers):
+            return verified(self, tolerance)
 
     def simulate(
         self,

@@ -36,6 +36,7 @@ from .gradients.ends import ENDS, METHODS, check_points, lexicographic_ends, sol
 from .gradients.multistart import MultistartSolver, MultistartStopping
 from .gradients.scalarised import END, MOST_ITERATIONS, WEAK, WORK, GradientSolves, Scalarised
 from .io.console import working
+from .io.workers import Workers
 from .pareto.dominance import distinct, separate
 from .refinement.mending import mended, resolve_unverified
 from .refinement.mesh_loop import MeshLoop, Programs
@@ -62,6 +63,7 @@ def optimize(
     verify: float | None = VERIFY,
     max_iterations: int = MOST_ITERATIONS,
     time_limit: float | None = None,
+    workers: Workers | None = None,
     progress: bool | None = None,
 ) -> Point:
     """The optimum of one objective; the others are ignored.
@@ -92,6 +94,9 @@ def optimize(
         Most iterations of IPOPT in one solve, all its strategies together.
     time_limit : float, optional
         Seconds after which the work ends with its results so far, as it does after Ctrl-C.
+    workers : int, "all" or Executor, optional
+        Processes that work side by side, "all" for one for each core, or a `concurrent.futures.Executor`. The result is the
+        same, to the last bit. Other processes than this one begin after a second of work. Default: 1.
     progress : bool, optional
         Show the progress on stderr. Default: on a terminal and in a notebook, from the third second on.
 
@@ -114,7 +119,7 @@ def optimize(
     >>> round(best.objectives["horizontal speed"], 4)
     0.9039
     """
-    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress)
     job = _Job("optimize", problem, transcription, terms, objective=objective)
     names = [goal.name for goal in job.problem.goals]
     if objective is not None and objective not in names:
@@ -134,13 +139,14 @@ def payoff(
     verify: float | None = VERIFY,
     max_iterations: int = MOST_ITERATIONS,
     time_limit: float | None = None,
+    workers: Workers | None = None,
     progress: bool | None = None,
 ) -> Front:
     """The ends of the front: for each objective its best value, and for that the best values of the others, in their order.
 
     Parameters
     ----------
-    problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
+    problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress
         As for `optimize`; with "auto", the `starts`, `optima` and `found` of `stats` are by the names of objectives.
 
     Returns
@@ -160,7 +166,7 @@ def payoff(
     >>> len(macs.payoff(problems.load("goddard"), starts=1))
     2
     """
-    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress)
     job = _Job("payoff", problem, transcription, terms)
 
     def work() -> Front:
@@ -184,13 +190,14 @@ def sweep(
     verify: float | None = VERIFY,
     max_iterations: int = MOST_ITERATIONS,
     time_limit: float | None = None,
+    workers: Workers | None = None,
     progress: bool | None = None,
 ) -> Front:
     """A front by gradient solves along it, each from the best point found before.
 
     Parameters
     ----------
-    problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
+    problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress
         As for `optimize`; each point is solved from so many `starts`. "auto": the optimum of each objective from as many as pay, see
         `payoff`; the points between, each from the one before, then from others as long as these find better ones.
     points : int
@@ -219,7 +226,7 @@ def sweep(
     check_count("points", points, 2)
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; there are {', '.join(METHODS)}")
-    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress)
     job = _Job("sweep", problem, transcription, terms, points=int(points), method=method)
     check_points(points, len(job.problem.goals))
     return job.run(lambda: job.swept(points, method), lambda front, verify: mended(front, verify, ends=job.ends, size=points))
@@ -244,10 +251,11 @@ class Terms:
     verify: float | None
     max_iterations: int
     time_limit: float | None
+    workers: Workers | None
     progress: bool | None
 
     def __post_init__(self) -> None:
-        Call(None, self.seed, self.tolerance, self.time_limit)
+        Call(None, self.seed, self.tolerance, self.time_limit, self.workers)
         check_starts("starts", self.starts)
         check_count("max_iterations", self.max_iterations, 1)
         check_verify(self.verify)
@@ -306,7 +314,7 @@ class _Job:
         are not verified are solved again by `again`.
         """
         verify = self._terms.verify
-        with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
+        with working(self._terms.time_limit, self._terms.progress, self._terms.workers) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             try:
                 own = None
@@ -335,7 +343,7 @@ class _Job:
             return self.run(lambda: self.front([self.solver.single(i)], None), resolve_unverified)
         terms, verify = self._terms, self._terms.verify
         limits = SEARCH.optimum * (verify or VERIFY)
-        with working(terms.time_limit, terms.progress) as (show, interrupts):
+        with working(terms.time_limit, terms.progress, terms.workers) as (show, interrupts):
             self.solves.before = lambda: show(f"{self._about['name']}: {self.solves.counts.gradient_solves} gradient solves done")
             wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits)
             loop = MeshLoop(Programs(self.problem), self.solves, wanted, SEARCH.meshes, WORK.most)

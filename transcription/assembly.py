@@ -133,7 +133,7 @@ class Assembly:
             Z[:, free] = candidates
             return Z
 
-        return replace(nlp, free=free, guess=guess[free], guessed=guessed, profiles=self.profiles(free.tolist(), states=True))
+        return replace(nlp, free=free, guess=guess[free], guessed=guessed, profiles=self.profiles(free.tolist(), states=True), widened=True)
 
     def profiles(self, free: Sequence[int], *, states: bool = False) -> tuple[ControlProfile, ...]:
         """See `NLP.profiles`, where these variables are `free`; with `states`, those of the states, too."""

@@ -125,6 +125,11 @@ def kept_nlp(problem: CompiledProblem, transcription: Transcription) -> NLP | No
     return computed(_transcribed, problem, transcription)
 
 
+def _unpickled(problem: CompiledProblem, transcription: Transcription, widened: bool) -> NLP:
+    nlp = transcription.transcribe(problem)
+    return nlp.whole if widened else nlp
+
+
 @dataclass(frozen=True, eq=False)
 class ControlProfile:
     """The free variables that are one control of one phase."""
@@ -185,6 +190,8 @@ class NLP(Deriving):
         derivatives are sparse.
     parts : Parts, optional
         The same functions as affine maps of what is evaluated at points, where they have that structure: derivatives follow at less cost.
+    widened : bool
+        Whether this is the `whole` of another one.
 
     Examples
     --------
@@ -217,6 +224,11 @@ class NLP(Deriving):
     measure: Callable[[], ca.Function]
     dense: int = 0
     parts: Parts | None = None
+    widened: bool = False
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As its problem and method: what is compiled does not pickle, and is soon made again."""
+        return _unpickled, (self.problem, self.transcription, self.widened)
 
     def __repr__(self) -> str:
         sizes = f"{len(self.variables)} variables ({len(self.free)} free), {len(self.g_lower)} rows"

@@ -18,6 +18,7 @@ from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..gradient_tools import Terms
 from ..gradients.scalarised import MOST_ITERATIONS
+from ..io.workers import Workers
 from ..preferences.goals import FuzzySatisfactory
 from ..preferences.preference import Preference
 from ..preferences.ranges import Ranges
@@ -39,6 +40,7 @@ def decide(
     verify: float | None = VERIFY,
     max_iterations: int = MOST_ITERATIONS,
     time_limit: float | None = None,
+    workers: Workers | None = None,
     progress: bool | None = None,
 ) -> Choice:
     """The point of a problem that suits a preference best, by gradients: a local optimum, and never worse than the best of `start`.
@@ -62,7 +64,7 @@ def decide(
     starts : int or "auto"
         Number of starts: the best-ranked points of `start`, the problem's guess, then random ones. "auto": the three best points of a
         `start` that is given; else all of the payoff table, and the guess if there is one. That table is found from as many starts.
-    seed, tolerance, verify, max_iterations, time_limit, progress
+    seed, tolerance, verify, max_iterations, time_limit, workers, progress
         As for `optimize`.
 
     Returns
@@ -87,7 +89,7 @@ def decide(
     >>> choice.point.verified
     True
     """
-    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress)
     solver, wanted = _stated(problem, transcription, preference, ranges, terms)
     return solver.run(lambda: solver.choose(wanted))
 
@@ -105,6 +107,7 @@ def satisfy(
     verify: float | None = VERIFY,
     max_iterations: int = MOST_ITERATIONS,
     time_limit: float | None = None,
+    workers: Workers | None = None,
     progress: bool | None = None,
 ) -> Choice:
     """The choice by fuzzy satisfactory goals with the least lambda, of those tried, at which the memberships keep their order of priority.
@@ -115,7 +118,7 @@ def satisfy(
 
     Parameters
     ----------
-    problem, transcription, ranges, start, starts, seed, tolerance, verify, max_iterations, time_limit, progress
+    problem, transcription, ranges, start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress
         As for `decide`. It may be called as `satisfy(problem, preference)`, too.
     preference : FuzzySatisfactory
         Its `regulating` is the first lambda.
@@ -142,7 +145,7 @@ def satisfy(
     >>> choice.degrees["horizontal speed"] > 0
     True
     """
-    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, progress)
+    terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress)
     solver, goals = _stated(problem, transcription, preference, ranges, terms)
     if not isinstance(goals, FuzzySatisfactory):
         raise ValueError(f"satisfy takes a FuzzySatisfactory, not {goals!r}; decide takes any preference")

@@ -76,7 +76,7 @@ class DecisionSolver:
 
     def run(self, task: Callable[[], Result]) -> Result:
         """What a task returns for which points and ranges are known, and which Ctrl-C and the time limit ask to end."""
-        with working(self._terms.time_limit, self._terms.progress) as (show, interrupts):
+        with working(self._terms.time_limit, self._terms.progress, self._terms.workers) as (show, interrupts):
             self._reason = lambda: interrupts.reason
             self.solves.before = lambda: show(f"decide: {self.solves.counts.gradient_solves} gradient solves done")
             try:

@@ -196,14 +196,12 @@ class StageSolver:
         """The best of so many solves: from known vectors, then from random ones."""
         Z = derived.lifted(known.nlp.variables, nlp.variables, known.Z, known.F)
         solver = MultistartSolver(nlp, Z, 1, self.rng, self.solves)
-        found: list[Solved] = []
-        for k in range(starts):
-            try:
-                found.append(solver.from_vector(Z[k], MINIMUM) if k < len(Z) else solver.from_drawn(MINIMUM))
-            except Stopped:
-                if not found:
-                    raise
-                break
+        found = solver.from_vectors([(z, MINIMUM) for z in Z[:starts]])
+        try:
+            found += solver.from_draws([MINIMUM] * (starts - len(found)))
+        except Stopped:
+            if not found:
+                raise
         return min(found, key=MINIMUM.rank)
 
     def _solution(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
+from typing import Any
+
 import numpy as np
 
 from problems.compiled import Objective
@@ -9,13 +12,23 @@ from problems.sampling import refuse_peaks
 from transcription.base import NLP
 from transcription.inner import InnerSolver
 from transcription.nlp.derivatives import refuse_dense
-from transcription.nlp.scalarized import scalarize
+from transcription.nlp.scalarized import Solved, scalarize
 from transcription.smooth import Smooth
 
+from ..io.workers import each
 from .evaluator import Counts, Evaluation, Evaluator
 
 SOLVE_ITERATIONS = 100
 """Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others."""
+
+
+def _descended(
+    nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, margin: np.ndarray | None, tolerance: float
+) -> Solved:
+    """The result of one gradient solve."""
+    limit = SOLVE_ITERATIONS if margin is None else 2 * SOLVE_ITERATIONS
+    settings: dict[str, Any] = {"tolerance": tolerance, "max_iterations": limit, "persistent": False}
+    return scalarize(nlp, start, reference=reference, weights=weights, margin=margin, **settings)
 
 
 class Bilevel(Evaluator):
@@ -81,22 +94,9 @@ class Bilevel(Evaluator):
     def _descend(
         self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None
     ) -> tuple[Evaluation, int]:
-        found = []
         inside = [None] * len(starts) if margins is None else margins
-        for start, reference, weight, margin in zip(starts, references, weights, inside, strict=True):
-            solved = scalarize(
-                self.nlp,
-                start,
-                reference=reference,
-                weights=weight,
-                margin=margin,
-                tolerance=self.tolerance,
-                max_iterations=SOLVE_ITERATIONS if margin is None else 2 * SOLVE_ITERATIONS,
-                persistent=False,
-            )
-            if not solved.begun:
-                break
-            found.append(solved)
+        pieces = [*zip(starts, references, weights, inside, [self.tolerance] * len(starts), strict=True)]
+        found = [*takewhile(lambda solved: solved.begun, each(_descended, self.nlp, pieces))]
         evaluation = Evaluation(
             Z=np.array([solved.z for solved in found]).reshape(-1, starts.shape[1]),
             F=np.array([solved.F for solved in found]).reshape(-1, references.shape[1]),

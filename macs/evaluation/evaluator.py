@@ -155,7 +155,7 @@ class Evaluation:
             np.concatenate([self.status, other.status]),
         )
 
-    def take(self, rows: np.ndarray) -> Evaluation:
+    def take(self, rows: np.ndarray | slice) -> Evaluation:
         """Some of the points; of violations only the largest is known."""
         return Evaluation(self.Z[rows], self.F[rows], self.violation[rows], self.status[rows])
 

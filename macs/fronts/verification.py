@@ -23,6 +23,7 @@ from transcription.trajectories.simulate import simulate
 from transcription.trajectories.trajectory import PhaseTrajectory
 
 from ..evaluation.evaluator import CONVERGED
+from ..io.workers import each
 from .point import Point
 from .points import Points
 from .verified import missed, verified
@@ -65,8 +66,8 @@ def verify(front: Points, *, tolerance: float, rtol: float = 1e-10) -> list[Chec
         # What is wrong with the front as such is reported before any simulation.
         programs = _programs(front)
         recomputed = [_recomputed(point, nlp) for point, nlp in zip(front, programs, strict=True)]
-        alone = partial(simulate, stated, rtol=rtol, atol=0.1 * rtol)
-        marked = verified(plain, tolerance, remark=False, simulations=lambda several: [*map(alone, several)])
+        alone = partial(simulate, rtol=rtol, atol=0.1 * rtol)
+        marked = verified(plain, tolerance, remark=False, simulations=lambda several: each(alone, stated, [(one,) for one in several]))
     off = tolerance * _infinite(missed(marked)).max(axis=1, initial=0.0)
     defect, simulated = _infinite(marked.defect), _infinite(marked.simulated_violation)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -14,7 +15,7 @@ from problems.vector import CompiledVectorProblem, without_dynamics
 from transcription.stopping import Stopped
 from transcription.trajectories.jumps import UNTRUSTED
 from transcription.trajectories.limits import excess
-from transcription.trajectories.simulate import Simulation, defect_of_elements, simulate_all, worst_violation
+from transcription.trajectories.simulate import Simulation, defect_of_elements, simulate, simulate_all, worst_violation
 from transcription.trajectories.tables import rough_tables
 from transcription.trajectories.trajectory import Trajectory
 
@@ -22,6 +23,7 @@ from ..evaluation.blackbox import evaluated_again
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..io.interrupts import spending
 from ..io.text import counted
+from ..io.workers import each
 from ..pareto.dominance import extremes, objective_units, stated_scales, varies
 from .points import Points
 from .provenance import AnyCompiled
@@ -50,10 +52,11 @@ class Simulations:
     def __call__(self, trajectories: Sequence[Trajectory]) -> list[Simulation]:
         """The simulation of each. See `simulate_all` for what it raises."""
         rtol, atol = accuracy(self.tolerance)
-        for one in trajectories:
-            if id(one) not in self._kept:
-                # With the trajectory: as long as it lives, no other has its identity.
-                self._kept[id(one)] = one, simulate_all(self.problem, [one], rtol=rtol, atol=atol)[0]
+        new = list({id(one): one for one in trajectories if id(one) not in self._kept}.values())
+        alone = partial(simulate, rtol=rtol, atol=atol)
+        for one, simulation in zip(new, each(alone, self.problem, [(one,) for one in new]), strict=True):
+            # With the trajectory: as long as it lives, no other has its identity.
+            self._kept[id(one)] = one, simulation
         return [self._kept[id(one)][1] for one in trajectories]
 
 

@@ -13,6 +13,7 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED
+from ..io.workers import BATCH
 from ..pareto.directions import divisions_below, simplex_lattice
 from .multistart import MULTISTART, MultistartSolver
 from .scalarised import END, WEAK, WORK, Scalarised, strongly_optimal, without_loss
@@ -65,22 +66,23 @@ def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict
     optima k like those from which objective i was sought before, whose objectives `tried` has by (i, k)."""
     m, scales = len(optima), nlp_scales(solver.nlp)
     for _ in range(ENDS.rounds):
-        improved = False
+        spans, pairs = _spans(optima), list[tuple[int, int]]()
         for i, k in permutations(range(m), 2):
             if optima[k].status != CONVERGED or solver.convex[i] or solver.is_least(optima[i], Scalarised.single(i, m)):
                 continue
-            spans = _spans(optima)
-            if (i, k) in tried and (np.abs(optima[k].F - tried[i, k]) <= ENDS.loose * spans).all():
-                continue
-            tried[i, k] = optima[k].F
-            with solver.solves.at_most(END.ties):
-                found = solver.from_vector(optima[k].z, Scalarised.single(i, m))
-                found = _gone_on(solver, found, optima[i].F[i] - ENDS.loose * spans[i], Scalarised.single(i, m))
-            # What an end has lost to the others is none.
-            gain = max(ENDS.gain * scales[i], 2 * END.slack * spans[i])
-            if found.status == CONVERGED and (optima[i].status != CONVERGED or optima[i].F[i] - found.F[i] > gain):
-                optima[i], improved = found, True
-        if not improved:
+            if (i, k) not in tried or (np.abs(optima[k].F - tried[i, k]) > ENDS.loose * spans).any():
+                tried[i, k] = optima[k].F
+                pairs.append((i, k))
+        tasks, before = [Scalarised.single(i, m) for i, _ in pairs], list(optima)
+        with solver.solves.at_most(END.ties):
+            found = solver.from_vectors([(optima[k].z, task) for (_, k), task in zip(pairs, tasks, strict=True)])
+            for (i, _), task, one in zip(pairs, tasks, found, strict=True):
+                solved = _gone_on(solver, one, optima[i].F[i] - ENDS.loose * spans[i], task)
+                # What an end has lost to the others is none.
+                gain = max(ENDS.gain * scales[i], 2 * END.slack * spans[i])
+                if solved.status == CONVERGED and (optima[i].status != CONVERGED or optima[i].F[i] - solved.F[i] > gain):
+                    optima[i] = solved
+        if all(one is other for one, other in zip(before, optima, strict=True)):
             break
 
 
@@ -121,10 +123,15 @@ def _spans(optima: Sequence[Solved]) -> np.ndarray:
 
 
 def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[Solved]:
-    """The results of all tasks, in their order: also from results of others that are better for them and, with several starts, from that of
+    """The results of all tasks: also from results of others that are better for them and, with several starts, from that of
     the next one; with as many starts as pay, from others in turn, as long as these find better ones and take no more work than the
     tasks."""
-    before, found = solver.solves.counts.work, [solver.solve(task) for task in tasks]
+    before, found = solver.solves.counts.work, list[Solved]()
+    for k in (0, 1):
+        # Every second one first: the others then begin beside one that is known.
+        found += solver.solve_all(tasks[k::2])
+    half = (len(tasks) + 1) // 2
+    found = [found[k // 2 + half * (k % 2)] for k in range(len(tasks))]
     if (solver.starts or 1) > 1:
         for k in range(len(tasks) - 2, -1, -1):
             found[k] = min(found[k], solver.from_vector(found[k + 1].z, tasks[k]), key=tasks[k].rank)
@@ -146,7 +153,7 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
 def _from_rivals(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved]) -> None:
     """Replace results by better ones, from solves that start at the results of other tasks, as long as any improves."""
     for _ in range(ENDS.from_rivals):
-        before, found[:] = found[:], [solver.from_rival(solved, task) for solved, task in zip(found, tasks, strict=True)]
+        before, found[:] = found[:], solver.from_rivals(found, tasks)
         if all(one is other for one, other in zip(before, found, strict=True)):
             break
 
@@ -154,14 +161,15 @@ def _from_rivals(solver: MultistartSolver, tasks: Sequence[Scalarised], found: l
 def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved], limit: float) -> bool:
     """Solve each task from another start; returns whether any result was replaced."""
     replaced = False
-    for k, task in enumerate(tasks):
+    for k in range(0, len(tasks), BATCH):
         if solver.drawn_enough or solver.convex.all() or solver.solves.counts.work >= limit or stopping():
             return False
         with solver.solves.at_most(MULTISTART.iterations):
-            other = solver.from_drawn(task, found[k] if found[k].status == CONVERGED else None)
-        alpha, known = task.optimum(other), task.optimum(found[k])
-        if alpha is not None and (known is None or alpha < known - MULTISTART.clearly):
-            found[k], replaced = other, True
+            others = solver.from_draws(tasks[k : k + BATCH], found[k : k + BATCH])
+        for i, other in enumerate(others, k):
+            alpha, known = tasks[i].optimum(other), tasks[i].optimum(found[i])
+            if alpha is not None and (known is None or alpha < known - MULTISTART.clearly):
+                found[i], replaced = other, True
     return replaced
 
 

@@ -10,7 +10,7 @@ Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimiza
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -24,6 +24,7 @@ from transcription.smooth import Smooth
 from transcription.stopping import Stopped, stopping
 
 from ..evaluation.evaluator import CONVERGED
+from ..io.workers import BATCH
 from ..pareto.archive import Archive
 from .scalarised import WORK, GradientSolves, Scalarised
 
@@ -159,11 +160,18 @@ class MultistartStopping:
     @property
     def enough(self) -> bool:
         """Whether further starts are not expected to find another optimum, or have found nothing better for long."""
+        return self.needed <= 0
+
+    @property
+    def needed(self) -> int:
+        """How many starts more there will be at least; 0 or less where there are enough."""
         if not self.converged:
-            return self.starts >= MULTISTART.fewest
+            return MULTISTART.fewest - self.starts
         if self.convex or self.complete:
-            return True
-        return self.starts >= min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most)
+            return 0
+        many, optima = min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most), self.optima()
+        pairs = optima * (optima + 1) / (self._unseen if optima == 1 else MULTISTART.unseen)
+        return min(many - self.starts, max(int(np.ceil(0.5 + np.sqrt(0.25 + pairs))) - self.converged, 1))
 
     @property
     def _same(self) -> float:
@@ -216,7 +224,7 @@ class MultistartSolver:
         for i in np.intersect1d(np.array(rows)[~np.isin(columns, times)], np.flatnonzero(self.convex)).tolist():
             z, failed, least = self._known.Z[0] if len(self._known) else self._starts.draw()[0], 0, -np.inf
             for given in np.linspace(self.nlp.upper[times], self.nlp.lower[times], 17):
-                found = self._held(z, Scalarised.single(i, m), given)
+                (found,) = self._held(z, Scalarised.single(i, m), [given])
                 failed = 0 if found.status == CONVERGED else failed + 1
                 if failed == 2 or stopping():  # shorter times are infeasible, too
                     break
@@ -224,10 +232,10 @@ class MultistartSolver:
                     self._uneven += [i] if found.F[i] < least - MULTISTART.rounding * abs(least) else []
                     z, least = self._added(found).z, found.F[i]
 
-    def _held(self, start: np.ndarray, task: Scalarised, times: np.ndarray) -> Solved:
-        """The result of a solve from a vector (n,) for given times (k,)."""
+    def _held(self, start: np.ndarray, task: Scalarised, times: Sequence[np.ndarray]) -> list[Solved]:
+        """The results of solves from a vector (n,) for given times (k,) each."""
         with self.solves.at_most(MULTISTART.held):
-            return self.solves(self.nlp, self._with_times(start, times), task, held=self.nlp.times)
+            return self.solves.each(self.nlp, [(self._with_times(start, given), task) for given in times], held=self.nlp.times)
 
     def _added(self, solved: Solved) -> Solved:
         """A result, which is known from now on if it converged."""
@@ -237,12 +245,17 @@ class MultistartSolver:
 
     def solve(self, task: Scalarised, start: np.ndarray | None = None) -> Solved:
         """The best result of `starts` solves, the first from `start` (n,) or the best known vector for this problem."""
+        return self.solve_all([task], start)[0]
+
+    def solve_all(self, tasks: Sequence[Scalarised], start: np.ndarray | None = None) -> list[Solved]:
+        """The same for several problems, side by side."""
         self._over_times()
-        first = start if start is not None else self.nearest(task)
-        found = [] if first is None else [self.from_vector(first, task)]
-        for _ in range((self.starts or 1) - len(found)):
-            found.append(self.from_drawn(task))
-        return min(found, key=task.rank)
+        firsts = [start if start is not None else self.nearest(task) for task in tasks]
+        begun = [(first, task) for first, task in zip(firsts, tasks, strict=True) if first is not None]
+        others = [task for first, task in zip(firsts, tasks, strict=True) for _ in range((self.starts or 1) - (first is not None))]
+        found = [*zip((task for _, task in begun), self.from_vectors(begun), strict=True)]
+        found += [*zip(others, self.from_draws(others), strict=True)]
+        return [min((solved for other, solved in found if other is task), key=task.rank) for task in tasks]
 
     def single(self, i: int) -> Solved:
         """The optimum of objective i alone. A solve from the best known vector may fail if that is an optimum of another objective within
@@ -256,7 +269,7 @@ class MultistartSolver:
         else:
             begun = self.nearest(task)
             solved = self.solve(task)
-        solved = self.from_rival(solved, task)
+        (solved,) = self.from_rivals([solved], [task])
         for start in self._known.Z[: self._given] if solved.status != CONVERGED and not self.closest else ():
             if begun is None or (start != begun).any():
                 solved = min(solved, self.from_vector(start, task), key=task.rank)
@@ -287,23 +300,25 @@ class MultistartSolver:
         found, before, sides = list[Solved](), self.solves.counts.work, self._sides()
         stopping_rule.convex = bool(self.convex[task.used].all())
         with suppress(Stopped):
-            while not (
-                stopping_rule.enough
-                or self.closest
-                or self.drawn_enough
-                or self.solves.counts.work - before >= work * (MULTISTART.last if stopping_rule.found_once else 1)
-                or stopping()
-                or self.is_least(best, task)
-            ):
-                # Where none has converged yet, they may all take long.
+            while not (stopping_rule.enough or self.closest or self.drawn_enough or stopping() or self.is_least(best, task)):
+                left = work * (MULTISTART.last if stopping_rule.found_once else 1) - (self.solves.counts.work - before)
+                if left <= 0.0:
+                    break
                 converged = stopping_rule.converged
+                # Where none has converged yet, they may all take long.
                 with self.solves.at_most(MULTISTART.iterations if converged else self.solves.max_iterations):
-                    side = next(sides, None)
-                    other = self.from_drawn(task, best if converged else None) if side is None else self.from_times(best.z, task, side)
-                    found.append(other)
+                    if sides:
+                        new, sides = self.from_times(best.z, task, sides), []
+                    else:
+                        cost = float(np.mean([one.iterations for one in (best, *found)])) * len(self.nlp.variables)
+                        paid, room = max(left / max(cost, 1.0), 1.0), self.most - self._starts.drawn
+                        count = int(min(BATCH, stopping_rule.needed, room, paid))
+                        new = self.from_draws([task] * count, [best] * count if converged else ())
+                found += new
                 # One that is hardly better is the same optimum: that of the first start is as good.
-                if stopping_rule.add(task.optimum(found[-1])) or (not stopping_rule.converged and found[-1].violation < best.violation):
-                    best = found[-1]
+                for one in new:
+                    if stopping_rule.add(task.optimum(one)) or (not stopping_rule.converged and one.violation < best.violation):
+                        best = one
         if stopping_rule.convex and (rival := self.rival(best, task)) is not None:
             best = min(best, self.from_vector(rival, task, near=True), key=task.rank)
         return best, found
@@ -336,22 +351,27 @@ class MultistartSolver:
 
     def from_vector(self, start: np.ndarray, task: Scalarised, near: bool = False) -> Solved:
         """The result of one solve from a vector (n,), or near it only; if it converged, later solves may begin at it."""
-        return self._added(self.solves(self.nlp, start, task, near))
+        return self.from_vectors([(start, task)], near)[0]
 
-    def from_drawn(self, task: Scalarised, best: Solved | None = None) -> Solved:
-        """The result of a solve from a random start, with the states of the guess if propagated ones lead to no optimum and no `best` is
-        known."""
-        found: list[Solved] = []
-        for start in self._starts.draw(None if best is None else best.z):
-            found.append(self.from_vector(start, task))
-            if found[-1].status == CONVERGED or best is not None:
-                break
-        return min(found, key=task.rank)
+    def from_vectors(self, begun: Sequence[tuple[np.ndarray, Scalarised]], near: bool = False) -> list[Solved]:
+        """The same for several vectors, each with its problem, side by side."""
+        return [self._added(solved) for solved in self.solves.each(self.nlp, begun, near)]
 
-    def _sides(self) -> Iterator[np.ndarray]:
+    def from_draws(self, tasks: Sequence[Scalarised], known: Sequence[Solved] = ()) -> list[Solved]:
+        """The result of a solve of each problem from a random start, near a known optimum where there is one; without, from the states of
+        the guess if propagated ones lead to no optimum."""
+        best = [one.z if one.status == CONVERGED else None for one in known] or [None] * len(tasks)
+        drawn = [self._starts.draw(z) for z in best]
+        found = self.from_vectors([(starts[0], task) for starts, task in zip(drawn, tasks, strict=True)])
+        again = [k for k, one in enumerate(found) if one.status != CONVERGED and best[k] is None and len(drawn[k]) > 1]
+        for k, other in zip(again, self.from_vectors([(drawn[k][1], tasks[k]) for k in again]), strict=True):
+            found[k] = min(found[k], other, key=tasks[k].rank)
+        return found
+
+    def _sides(self) -> list[np.ndarray]:
         """Times (k,) to begin with: all at their upper bounds, then all at their lower ones."""
         times = self.nlp.times
-        return iter((self.nlp.upper[times], self.nlp.lower[times]) if len(times) else ())
+        return [self.nlp.upper[times], self.nlp.lower[times]] if len(times) else []
 
     def _with_times(self, z: np.ndarray, times: np.ndarray) -> np.ndarray:
         """The vector (n,) with other times (k,)."""
@@ -359,11 +379,14 @@ class MultistartSolver:
         other[self.nlp.times] = times
         return other
 
-    def from_times(self, start: np.ndarray, task: Scalarised, times: np.ndarray) -> Solved:
-        """The result of a solve that begins at the optimum for these times (k,), from a vector (n,): a linear-quadratic problem is convex
+    def from_times(self, start: np.ndarray, task: Scalarised, times: Sequence[np.ndarray]) -> list[Solved]:
+        """The results of solves that begin at the optima for given times (k,), from a vector (n,): a linear-quadratic problem is convex
         for given times, and where these are free, too, its solves end at times where the optimum hardly depends on them."""
         found = self._held(start, task, times)
-        return self.from_vector(found.z, task, near=True) if found.status == CONVERGED else found
+        good = [k for k, one in enumerate(found) if one.status == CONVERGED]
+        for k, solved in zip(good, self.from_vectors([(found[k].z, task) for k in good], near=True), strict=True):
+            found[k] = solved
+        return found
 
     def merits(self, task: Scalarised, F: np.ndarray, violation: np.ndarray, strict: bool = False) -> np.ndarray:
         """Merits (k,) of points F (k, m), to be minimised: alpha plus the excess over constraints, and over limits in ranges of the known
@@ -388,12 +411,15 @@ class MultistartSolver:
         own = self.merits(task, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
         return self._known.Z[np.argmin(merits)] if merits.min() < own - MULTISTART.clearly else None
 
-    def from_rival(self, solved: Solved, task: Scalarised) -> Solved:
-        """The better of a result and a solve from a better known vector; if that moves far away, also of one that stays near the vector."""
+    def from_rivals(self, found: Sequence[Solved], tasks: Sequence[Scalarised]) -> list[Solved]:
+        """The better of each result and a solve from a better known vector; if that moves far away, also of one that stays near it."""
+        found = list(found)
         for near in (False, True):
-            if (rival := self.rival(solved, task)) is not None:
-                solved = min(solved, self.from_vector(rival, task, near), key=task.rank)
-        return solved
+            rivals = {k: rival for k, task in enumerate(tasks) if (rival := self.rival(found[k], task)) is not None}
+            again = self.from_vectors([(rival, tasks[k]) for k, rival in rivals.items()], near)
+            for k, solved in zip(rivals, again, strict=True):
+                found[k] = min(found[k], solved, key=tasks[k].rank)
+        return found
 
     def is_least(self, solved: Solved, task: Scalarised) -> bool:
         """Whether a result converged and is the least that bounds allow, see `is_least` beside this class."""

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
+from ..io.workers import BATCH
 from ..pareto.archive import Archive
 from ..pareto.directions import across, divisions_below, simplex_lattice
 from ..pareto.dominance import BETTER, CURVE, among, distinct, extremes, feasible_and_no_worse, nearest, ranges, slack
@@ -168,20 +169,18 @@ def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.n
     pairs = sorted(((i, j) for i in rows for j in nearest(archive.F[i], archive.F, span)[1 : m + 1]), key=lambda pair: worse[pair])
     known = solves.failed_pairs if solves.failed_pairs is not None else np.empty((0, 2 * m))
     both = [np.hstack([archive.F[i], archive.F[j]]) for i, j in pairs]
+    new = [k for k, pair in enumerate(both) if not among(pair[None], known)[0]]
     left, better, failed, fruitless = solves.left // (2 if len(pairs) > solves.left else 1), archive.take(np.arange(0)), [known], 0
-    for (i, j), pair in zip(pairs, both, strict=True):
-        if among(pair[None], known)[0]:
-            continue
-        if left <= 0 or solves.left <= 0 or fruitless == len(archive):
-            break
-        found = solves(archive.Z[[j]], archive.F[[i]], span[None])
-        gained = found.status[0] == CONVERGED and ((archive.F[i] - found.F[0]) / span).min() > BETTER
-        left, fruitless = left - 1, 0 if gained else fruitless + 1
-        if gained:
+    while new and (count := min(len(archive) - fruitless, left, solves.left)) > 0:
+        some, new, left = new[:count], new[count:], left - count
+        i, j = np.array([pairs[k] for k in some]).T
+        found = solves(archive.Z[j], archive.F[i], np.tile(span, (len(some), 1)))
+        gained = (found.status == CONVERGED) & (((archive.F[i] - found.F) / span).min(axis=1) > BETTER)
+        fruitless = int(np.argmax(gained[::-1])) if gained.any() else fruitless + count
+        if gained.any():
             solves.promise(m)
-            better = Archive.of(found, np.ones(1, dtype=bool)).joined(better)
-        else:
-            failed.append(pair[None])
+        better = Archive.of(found, gained).joined(better)
+        failed += [both[k][None] for k in np.array(some)[~gained]]
     solves.failed_pairs = np.vstack(failed)
     return _front(better.joined(archive), span) if len(better) else archive
 
@@ -307,26 +306,28 @@ def cover(archive: Archive, ends: Archive, solves: BudgetedSolves, limit: int, g
 class PolishLog:
     """Results of the first k solves of a polish, which can be continued with them."""
 
-    SHAPES: ClassVar[dict[str, str]] = {"Z": "k D", "F": "k m", "violation": "k", "status": "k str"}
+    SHAPES: ClassVar[dict[str, str]] = {"Z": "k D", "F": "k m", "violation": "k", "status": "k str", "work": "k"}
 
     archive: Archive  # the archive before the polish
     Z: np.ndarray  # Z, F, violation, status: (k, D), (k, m), (k,), (k,): Results in the order of the solves; see `Evaluation`
     F: np.ndarray
     violation: np.ndarray
     status: np.ndarray
+    work: np.ndarray  # (k,): all work before the batch of each
 
     @classmethod
     def of(cls, archive: Archive) -> PolishLog:
         """The log of a polish that begins with this archive."""
-        return cls(archive, archive.Z[:0], archive.F[:0], archive.violation[:0], np.empty(0, dtype="<U10"))
+        return cls(archive, archive.Z[:0], archive.F[:0], archive.violation[:0], np.empty(0, dtype="<U10"), np.empty(0))
 
     def __len__(self) -> int:
         return len(self.F)
 
-    def add(self, found: Evaluation) -> None:
-        """Append the results of further solves."""
+    def add(self, found: Evaluation, work: float) -> None:
+        """Append the results of further solves, with the work before them."""
         self.Z, self.F = np.vstack([self.Z, found.Z]), np.vstack([self.F, found.F])
         self.violation, self.status = np.append(self.violation, found.violation), np.append(self.status, found.status)
+        self.work = np.append(self.work, np.full(len(found.F), float(work)))
 
     def take(self, rows: slice) -> Evaluation:
         """The results of the solves `rows`."""
@@ -354,20 +355,20 @@ class BudgetedSolves:
         """The results of `Evaluator.descend`; rows beyond the number of solves count as failed."""
         Z, F = np.array(starts), np.full(references.shape, np.nan)
         violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
-        for row in range(max(min(len(starts), self.left), 0)):
-            one = slice(row, row + 1)
-            task = starts[one], references[one], weights[one]
-            same = b"".join(part.tobytes() for part in task)
-            if same not in self._answers:
-                if self._worked_enough:
-                    break
-                found = self._solve(*task)
-                if not len(found.F):
-                    self.left, self.stopped = 0, True
-                    break
-                self.left, self._answers[same] = self.left - 1, found
-            found = self._answers[same]
-            Z[one], F[one], violation[one], status[one] = found.Z, found.F, found.violation, found.status
+        tasks = [b"".join(part[row].tobytes() for part in (starts, references, weights)) for row in range(len(starts))]
+        new = [row for row, task in enumerate(tasks) if task not in self._answers and task not in tasks[:row]]
+        for k in range(0, len(new), BATCH):
+            if not (some := new[k : k + min(BATCH, self._allowed)]):
+                break
+            found = self._solve(starts[some], references[some], weights[some])
+            self._answers |= {tasks[row]: found.take(slice(i, i + 1)) for i, row in enumerate(some[: len(found.F)])}
+            self.left -= len(found.F)
+            if len(found.F) < len(some):
+                self.left, self.stopped = 0, True
+                break
+        for row, task in enumerate(tasks):
+            if (answer := self._answers.get(task)) is not None:
+                Z[row], F[row], violation[row], status[row] = answer.Z[0], answer.F[0], answer.violation[0], answer.status[0]
         return Evaluation(Z, F, violation, status)
 
     def feasible(self, found: Evaluation) -> np.ndarray:
@@ -379,17 +380,21 @@ class BudgetedSolves:
         self._promised = self._made + count
 
     @property
-    def _worked_enough(self) -> bool:
-        """Whether no further solve is to be made, whatever their number; those in the log are."""
-        known = 0 if self._log is None else len(self._log)
-        return self._made >= max(self._promised, known) and self._evaluator.counts.work >= self._most_work
+    def _work(self) -> float:
+        """The work before the next solve, from the log or at present."""
+        return self._log.work[self._made] if self._log is not None and self._made < len(self._log) else self._evaluator.counts.work
 
-    def _solve(self, start: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> Evaluation:
-        """The result of the next solve, one row, from the log or made now; no row if asked to end early."""
-        made, self._made = self._made, self._made + 1
-        if self._log is not None and made < len(self._log):
-            return self._log.take(slice(made, made + 1))
-        found = self._evaluator.descend(start, reference, weights)
-        if self._log is not None:
-            self._log.add(found)
-        return found
+    @property
+    def _allowed(self) -> int:
+        """How many solves may be made now: all that are left or, after the most work, those that are promised."""
+        return max(0, self.left if self._work < self._most_work else min(self.left, self._promised - self._made))
+
+    def _solve(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
+        """The results of the next solves, from the log or made now, side by side; fewer if asked to end early."""
+        work, begun = self._work, self._made
+        self._made += len(starts)
+        if self._log is None:
+            return self._evaluator.descend(starts, references, weights)
+        if (known := max(len(self._log) - begun, 0)) < len(starts):
+            self._log.add(self._evaluator.descend(starts[known:], references[known:], weights[known:]), work)
+        return self._log.take(slice(begun, self._made))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,6 +15,7 @@ from transcription.nlp.scalarized import Solved, not_begun, scalarize
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED, FAILED, Counts
+from ..io.workers import each
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +227,11 @@ class WorkLimits:
 WORK = WorkLimits()
 
 
+def scalarized(nlp: NLP, start: np.ndarray, settings: Mapping[str, Any]) -> Solved:
+    """One piece of `GradientSolves.each`; see `scalarize`."""
+    return scalarize(nlp, start, **settings)
+
+
 class GradientSolves:
     """Gradient solves with one tolerance, which are counted."""
 
@@ -236,14 +242,25 @@ class GradientSolves:
 
     def __call__(self, nlp: NLP, start: np.ndarray, task: Scalarised, near: bool = False, held: Sequence[int] | np.ndarray = ()) -> Solved:
         """The result of one solve from a vector (n,), or near it only, where some variables keep their values; see `scalarize`."""
+        return self.each(nlp, [(start, task)], near, held)[0]
+
+    def each(
+        self,
+        nlp: NLP,
+        begun: Sequence[tuple[np.ndarray, Scalarised]],
+        near: bool = False,
+        held: Sequence[int] | np.ndarray = (),
+    ) -> list[Solved]:
+        """The results of independent solves, each from a vector (n,), side by side where there are processes (`io.workers`)."""
         self.before()
         if self._most_work <= self.counts.work:
-            return replace(not_begun(nlp, start), status=FAILED, clocked=False)
+            return [replace(not_begun(nlp, start), status=FAILED, clocked=False) for start, _ in begun]
         iterations = max(1, int(min(self.max_iterations, (self._most_work - self.counts.work) / len(nlp.variables))))
         persistent = self._persistent and iterations == self.max_iterations
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": iterations, "persistent": persistent}
-        aim: dict[str, Any] = {"reference": task.reference, "weights": task.weights, "ceiling": task.ceiling}
-        return self._counted(nlp, scalarize(nlp, start, **aim, near=near, held=held, **limits))
+        settings = {"near": near, "held": held, **limits}
+        pieces = [(one, {"reference": task.reference, "weights": task.weights, "ceiling": task.ceiling, **settings}) for one, task in begun]
+        return [self._counted(nlp, solved) for solved in each(scalarized, nlp, pieces)]
 
     def least_violation(self, nlp: NLP, start: np.ndarray) -> Solved:
         """A feasible or least violating vector near a vector (n,); see `least_violation`."""

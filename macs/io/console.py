@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Self, TextIO
 
 from .interrupts import Interrupts, work_on_trajectories
+from .workers import Workers, processes
 
 LINE_EVERY = 10.0
 """Seconds between plain lines."""
@@ -165,9 +166,10 @@ class Steps(StatusLine):
 
 
 @contextmanager
-def working(time_limit: float | None, progress: bool | None) -> Iterator[tuple[StatusLine, Interrupts]]:
-    """A context of long work: its status line, and its interrupts. Ctrl-C and the time limit ask it to end (`transcription.stopping`)."""
-    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, work_on_trajectories():
+def working(time_limit: float | None, progress: bool | None, workers: Workers | None = None) -> Iterator[tuple[StatusLine, Interrupts]]:
+    """A context of long work: its status line, its interrupts, and its processes. Ctrl-C and the time limit ask it to end, see
+    `transcription.stopping`."""
+    with StatusLine(progress) as status, Interrupts(time_limit) as interrupts, work_on_trajectories(), processes(workers):
         yield status, interrupts
 
 

@@ -22,6 +22,7 @@ from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_bet
 from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
+from ..io.workers import BATCH
 from ..pareto.archive import Archive
 from ..pareto.dominance import CURVE, extremes, feasible_and_no_worse, nearest, ranges
 from ..pareto.spread import Guide
@@ -151,18 +152,20 @@ def restart_solves(
     ends = archive.F[extremes(archive.F)]
     singles = [Scalarised.single(i, m) for i in range(m) if unimodal.all() or not unimodal[i]]
     between = tasks_between(ends, np.ptp(ends, axis=0), max(min(points, GRADIENT_RULES.first_points), m + 1), METHODS[0]) if m > 1 else []
-    found, worse = [], False
-    with solver.solves.at_most(MULTISTART.iterations):
-        for k in range(drawn, drawn + count):
-            if stopping():
-                break
+    found, worse = list[Solved](), False
+    while len(found) < count and not stopping():
+        tasks, starts = list[Scalarised](), list[np.ndarray]()
+        for k in range(drawn + len(found), drawn + min(len(found) + BATCH, count)):
             # Ends are what points between them follow: two starts for these, and one for one of those, in turn.
             inner = bool(between) and k % 3 == 2
             turn, which = divmod(k // 3, len(between)) if inner else divmod(k - k // 3 if between else k, len(singles))
-            task = (between if inner else singles)[which]
-            start = Starts(evaluator.nlp, rng, MULTISTART.everywhere + turn + which).draw(solver.nearest(task))[0]
-            found.append(solver.from_vector(start, task))
-            alpha, known = task.optimum(found[-1]), solver.merits(task, archive.F, archive.violation).min()
+            tasks.append((between if inner else singles)[which])
+            starts.append(Starts(evaluator.nlp, rng, MULTISTART.everywhere + turn + which).draw(solver.nearest(tasks[-1]))[0])
+        with solver.solves.at_most(MULTISTART.iterations):
+            solved = solver.from_vectors(list(zip(starts, tasks, strict=True)))
+        found += solved
+        for task, one in zip(tasks, solved, strict=True):
+            alpha, known = task.optimum(one), solver.merits(task, archive.F, archive.violation).min()
             worse |= alpha is not None and bool(
                 alpha > known + MULTISTART.same * (span / np.where(task.moving, task.weights, np.inf)).max()
             )
@@ -186,12 +189,19 @@ def gradient_actions(state: SearchState, settings: Settings, evaluator: Evaluato
     """Make the gradient solves of agents that are due, if the problem has derivatives."""
     if not (settings.refines and evaluator.has_gradients):
         return
-    due = state.evaluations // settings.variant.refine_every - state.gradients.solves
-    for _ in range(due):
-        gains, before = Gains(state, evaluator.tolerance), evaluator.counts.work
-        solved = individual_action(state, evaluator, settings.variant.F, guide)
-        give_credit(state, -1, sum(gains.of(one) for one in solved), evaluator.counts.work - before, len(solved))
-        update_archives(state, solved, settings, evaluator)
+    due = max(state.evaluations // settings.variant.refine_every - state.gradients.solves, 0)
+    solves = [turn for _ in range(due) if (turn := _next_solve(state, evaluator, settings.variant.F, guide)) is not None]
+    if not solves:
+        return
+    gains, before, agents, span = Gains(state, evaluator.tolerance), evaluator.counts.work, state.agents, ranges_of(state)
+    found = evaluator.descend(*(np.array(part) for part in zip(*(task for _, task in solves), strict=True)))
+    for k, (i, _) in enumerate(solves[: len(found.F)]):
+        one = found.take(slice(k, k + 1))
+        limit = agents.F[i] if agents.violation[i] <= evaluator.tolerance else np.full(agents.F.shape[1], np.inf)
+        if feasible_and_no_worse(one, limit[None], agents.violation[i : i + 1], span)[0]:
+            agents.place(np.array([i]), one.Z, one.F, one.violation)
+    give_credit(state, -1, gains.of(found), evaluator.counts.work - before, len(found.F))
+    update_archives(state, [found], settings, evaluator)
 
 
 def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator, guide: Guide | None) -> np.ndarray | None:
@@ -222,8 +232,10 @@ def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator,
     return np.vstack([log.archive.F, solved.F[solves.feasible(solved)], state.archive.F])
 
 
-def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide: Guide | None = None) -> list[Evaluation]:
-    """Make one gradient solve for the agent whose turn it is, along its own direction.
+def _next_solve(
+    state: SearchState, evaluator: Evaluator, F: float, guide: Guide | None
+) -> tuple[int, tuple[np.ndarray, np.ndarray, np.ndarray]] | None:
+    """The agent whose turn it is, and the start, reference and weights of its gradient solve, along its own direction.
 
     For a feasible agent the solve is guarded. Its start changes from turn to turn: the position of the agent, that of its nearest neighbour
     in the archive, or the proposal of a social action. The last two allow the agent to leave its basin of attraction. For an infeasible
@@ -239,7 +251,7 @@ def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide:
     state.gradients.solves += 1
     feasible = agents.violation[i] <= evaluator.tolerance
     if not np.isfinite(agents.F[i]).all():
-        return []
+        return None
     start = agents.Z[i].copy()
     others = np.flatnonzero((agents.F[i] != state.archive.F).any(axis=1) & feasible)
     if turn % 3 == 1 and others.size:
@@ -256,13 +268,7 @@ def individual_action(state: SearchState, evaluator: Evaluator, F: float, guide:
     alone = turn == 0 and m > 1 and np.count_nonzero(direction) == 1
     reference = state.ideal if m > CURVE and len(state.archive) >= m and not (weights == 0.0).any() else agents.F[i]
     reference = np.where(direction > 0, reference, np.inf) if alone else reference
-    found = evaluator.descend(start[None], reference[None], weights[None])
-    if not len(found.F):  # asked to end early
-        return []
-    limit = agents.F[i] if feasible else np.full(m, np.inf)
-    if feasible_and_no_worse(found, limit[None], agents.violation[i : i + 1], ranges_of(state))[0]:
-        agents.place(np.array([i]), found.Z, found.F, found.violation)
-    return [found]
+    return i, (start, reference, weights)
 
 
 def _any_inner(state: SearchState, guide: Guide | None) -> int:

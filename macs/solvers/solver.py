@@ -30,6 +30,7 @@ from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, check_verify, with_nearest
 from ..io.console import StatusLine
 from ..io.interrupts import TIME_LIMIT, Interrupts, spending, work_on_trajectories
+from ..io.workers import Workers, processes
 from ..refinement.mesh_search import SearchMeshes, search_meshes
 from .method import SearchMethod
 from .progress import Progress
@@ -68,6 +69,7 @@ class Solver(SearchMethod):
         start: Any = None,
         verify: float | None = VERIFY,
         time_limit: float | None = None,
+        workers: Workers | None = None,
         progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
@@ -106,6 +108,9 @@ class Solver(SearchMethod):
             Seconds after which the call ends with its results so far, as it does after Ctrl-C: within a second or two, whatever it is
             doing. The last quarter is left for simulations, and for solving again what these do not confirm. A run that this ends is
             recorded as not reproducible. If nothing was evaluated yet, the front is empty.
+        workers : int, "all" or Executor, optional
+            Processes that work side by side, "all" for one for each core, or a `concurrent.futures.Executor`. The result is the
+            same, to the last bit. Other processes than this one begin after a second of work. Default: 1.
         progress : bool, optional
             Show the progress of the search on stderr. Default: on a terminal and in a notebook, from the third second on.
         callback : callable, optional
@@ -156,7 +161,7 @@ class Solver(SearchMethod):
             check_problem(problem, transcription)
         elif transcription is not None or inner is not None:
             raise ValueError(f"{without_dynamics(problem.name)}: it takes no {'inner level' if transcription is None else 'transcription'}")
-        call = Call(self._budget(problem, evaluations), seed, tolerance, time_limit, progress, callback, checkpoint)
+        call = Call(self._budget(problem, evaluations), seed, tolerance, time_limit, workers, progress, callback, checkpoint)
         check_verify(verify)
         if isinstance(problem, VectorProblem | CompiledVectorProblem):
             return self._solve_vector(problem.compile(), start, verify, call)
@@ -183,7 +188,7 @@ class Solver(SearchMethod):
         check_start(start, compiled)
         about, level = self.about(), {"inner": inner if isinstance(inner, str) else repr(inner)}
         earlier, chosen = Counts(), None
-        with Interrupts(call.time_limit) as interrupts, work_on_trajectories():
+        with Interrupts(call.time_limit) as interrupts, work_on_trajectories(), processes(call.workers):
             try:
                 if transcription is None:
                     with StatusLine(call.progress) as show:
@@ -286,7 +291,7 @@ class Solver(SearchMethod):
         OSError
             If the checkpoint cannot be written; before any work.
         """
-        call = Call(self._budget(None, evaluations), seed, tolerance, time_limit, progress, callback, checkpoint)
+        call = Call(self._budget(None, evaluations), seed, tolerance, time_limit, None, progress, callback, checkpoint)
         problem = plain_problem(function, bounds, constraints=constraints, names=names, units=units, senses=senses)
         what = {
             "bounds": {v.name: (v.lower, v.upper) for v in problem.variables},

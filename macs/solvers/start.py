@@ -20,6 +20,7 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..gradients.multistart import guessed_start
 from ..io.atomic import check_target
+from ..io.workers import Workers, check_workers
 from .progress import Progress
 
 STARTS = ("uniform", "smooth")
@@ -40,6 +41,7 @@ class Call:
     seed: int | None
     tolerance: float
     time_limit: float | None
+    workers: Workers | None = None
     progress: bool | None = None
     callback: Callable[[Progress], Any] | None = None
     checkpoint: str | PathLike[str] | None = None
@@ -54,6 +56,7 @@ class Call:
         object.__setattr__(self, "tolerance", float(self.tolerance))
         if self.time_limit is not None:
             check_positive("time_limit", self.time_limit)
+        check_workers(self.workers)
         if self.callback is not None and not callable(self.callback):
             raise ValueError(f"callback must be callable, not {self.callback!r}")
         if checkpoint is not None:

@@ -89,6 +89,7 @@ TRANSCRIPTION = (
 )
 
 
+WORKERS = "processes that work side by side; the result is the same with any number (default: all, one for each core)"
 TRUST = "load problems and references that the files name by address, outside the catalogue: this runs their code"
 
 
@@ -146,9 +147,11 @@ def _answer(argv: Sequence[str] | None) -> int:
         # A warning, such as that of an old file, is one line, without the place in our code.
         warnings.formatwarning = lambda message, *_: f"{program}: {message}\n"
         with ended_at_once(program):
-            from . import commands
+            from macs.io.workers import processes
 
-        code = commands.COMMANDS[arguments.command](arguments)
+            from . import commands
+        with processes(getattr(arguments, "workers", None)):
+            code = commands.COMMANDS[arguments.command](arguments)
         sys.stdout.flush()
     except BrokenPipeError:
         # The reader of the output has closed it. Python would complain once more when it flushes at exit.
@@ -208,6 +211,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
     solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: the problem's own)")
     solve.add_argument("--time-limit", metavar="S", type=_seconds, help="seconds after which the search ends with what it has found")
+    solve.add_argument("--workers", metavar="N", type=_workers, default="all", help=WORKERS)
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
     solve.add_argument("--inner", metavar="NAME", help="the inner level: auto, propagate, ipopt, ... (default: the problem's own)")
     solve.add_argument(
@@ -251,6 +255,7 @@ def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
     verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="what simulated points may miss (default: 0.001)")
+    verify.add_argument("--workers", metavar="N", type=_workers, default="all", help=WORKERS)
 
 
 def _add_decide(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -267,6 +272,7 @@ def _add_decide(commands: argparse._SubParsersAction[Parser]) -> None:
     decide.add_argument("--improve", metavar="NAME", help="then make this objective better than it is")
     decide.add_argument("--to", metavar="VALUE", help="this much (default: as much as can be)")
     decide.add_argument("--giving", metavar="OTHER=LIMIT", action="append", help="others may become worse until this; again for others")
+    decide.add_argument("--workers", metavar="N", type=_workers, default="all", help=WORKERS)
     decide.add_argument("--alternatives", metavar="K", type=_positive, help="other choices about the one that is made")
     decide.add_argument("--out", metavar="CHOICE.nc", help="save the chosen point as a front")
     decide.add_argument("--json", metavar="CHOICE.json", help="save the choice, and all that led to it: `macs decide CHOICE.json` goes on")
@@ -373,6 +379,10 @@ def _number(kind: Callable[[str], Any], name: str, fits: Callable[[Any], bool], 
     if value is None or not fits(value):
         raise argparse.ArgumentTypeError(f"'{text}' is not {name}")
     return value
+
+
+def _workers(text: str) -> int | str:
+    return text if text == "all" else int(_number(int, "all or a whole number above 0", lambda value: value > 0, text))
 
 
 _positive = partial(_number, int, "a whole number above 0", lambda value: value > 0)

@@ -68,13 +68,13 @@ def test_starts_are_sought_longer_where_the_best_of_several_was_found_once(monke
     for losses in (iter(np.arange(-1.0, -99.0, -1.0)), iter([-1.0] * 99)):
         solver = MultistartSolver(nlp, None, None, np.random.default_rng(0), GradientSolves(1e-6))
 
-        def drawn(task, best=None, losses=losses, solver=solver):
-            solver.solves.counts.work += 1
-            return Solved(nlp.lower, np.array([next(losses), 0.0]), 0.0, "converged", 1)
+        def drawn(tasks, known=(), losses=losses, solver=solver):
+            solver.solves.counts.work += len(tasks)
+            return [Solved(nlp.lower, np.array([next(losses), 0.0]), 0.0, "converged", 1) for _ in tasks]
 
-        monkeypatch.setattr(solver, "from_drawn", drawn)
+        monkeypatch.setattr(solver, "from_draws", drawn)
         rule = MultistartStopping()
-        best = drawn(None)
+        (best,) = drawn([None])
         rule.add(best.F[0])
         counted.append(len(solver.drawn(best, Scalarised.single(0, 2), rule, 10.0)[1]))
     assert counted == [10 * MULTISTART.last, 10]

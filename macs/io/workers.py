@@ -1,0 +1,223 @@
+"""Independent pieces of work side by side: in processes of this machine, which are kept for the next ones, or of an executor.
+
+A method cuts its work into pieces without a look at how many processes there are, and where a piece is done changes nothing in its result:
+the same seed gives the same bits with any number.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import signal
+import tempfile
+import threading
+import time
+import uuid
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any, TypeVar
+
+import cloudpickle
+
+from transcription.stopping import stopped_by, stopping
+
+from .interrupts import work_on_trajectories
+
+log = logging.getLogger(__name__)
+Result = TypeVar("Result")
+Workers = int | str | Executor
+ALL = "all"
+BATCH = 8
+"""Most pieces that a method begins together before it looks at their results, where it decides by these: a part of the method, so that the
+number of processes changes nothing."""
+PAYS = 1.0
+"""Seconds of work after which further processes begin: about what that takes."""
+IDLE = 300.0
+"""Seconds without work after which a process ends."""
+KILLED = 2
+"""How often a process may be killed until this one works alone."""
+
+
+def check_workers(workers: Workers | None) -> None:
+    """Raise ValueError unless it is a number of processes, "all", an executor or None."""
+    if workers is None or isinstance(workers, Executor) or workers == ALL:
+        return
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise ValueError(f"workers must be a whole number of at least 1, {ALL!r} or a concurrent.futures.Executor, not {workers!r}")
+
+
+def cores() -> int:
+    """Cores that this process may use, as a container or a scheduler limits them."""
+    from loky import cpu_count
+
+    return cpu_count()
+
+
+@contextmanager
+def processes(workers: Workers | None) -> Iterator[None]:
+    """Within, independent pieces of work are done by so many processes, "all" for one for each core, or by an executor; None: as around."""
+    if workers is None:
+        yield
+        return
+    check_workers(workers)
+    count = cores() if isinstance(workers, str) else workers
+    token = _HELPERS.set(None if count == 1 else _own(count) if isinstance(count, int) else Helpers(0, count))
+    try:
+        yield
+    finally:
+        _HELPERS.reset(token)
+
+
+def each(do: Callable[..., Result], shared: Any, pieces: Sequence[tuple[Any, ...]]) -> list[Result]:
+    """`do(shared, *piece)` of every piece, in their order; an exception is that of the first piece that raised one.
+
+    Where the work is asked to end (`transcription.stopping`), so is each piece.
+    """
+    helpers = _HELPERS.get()
+    if helpers is None or len(pieces) < 2:
+        return [do(shared, *piece) for piece in pieces]
+    return helpers.each(do, shared, pieces)
+
+
+class Helpers:
+    """Processes that do pieces of work: `count` of this machine beside this one, begun when there was enough work for it to pay, or those
+    of an executor, while this one waits."""
+
+    def __init__(self, count: int, executor: Executor | None = None) -> None:
+        self._count, self._executor, self._given = count, executor, executor is not None
+        self._seconds, self._killed = 0.0, 0
+        self._taught: dict[str, list[Future[Any]]] = {}
+
+    def each(self, do: Callable[..., Result], shared: Any, pieces: Sequence[tuple[Any, ...]]) -> list[Result]:
+        """See `each` beside this class."""
+        found, left, begun = dict[int, Future[Any]](), deque(range(len(pieces))), dict[Future[Any], int]()
+        data = cloudpickle.dumps((do, shared)) if self._worth else b""
+        digest, stop = hashlib.sha256(data).hexdigest(), Path(tempfile.gettempdir()) / f"macs-{uuid.uuid4().hex}"
+        try:
+            while left or begun:
+                room = self._room(len(left), digest, data)
+                while left and len(begun) < room and (self._given or len(left) > 1):
+                    k = left.popleft()
+                    begun[self._submit(_perform, digest, data, pieces[k], str(stop))] = k
+                if left:
+                    k = left.pop()
+                    found[k] = self._here(do, shared, pieces[k])
+                else:
+                    wait(begun, timeout=0.1, return_when=FIRST_COMPLETED)
+                if begun and stopping():
+                    stop.touch()
+                for future in [one for one in begun if one.done()]:
+                    k = begun.pop(future)
+                    if self._lost(future):
+                        left.append(k)
+                    else:
+                        found[k] = future
+                if any(one.exception() is not None for one in found.values()):
+                    left.clear()  # as with one process, in which no piece after it would begin
+        except BaseException:
+            stop.touch()
+            for future in begun:
+                future.cancel()
+            wait(begun, timeout=1.0)
+            raise
+        finally:
+            stop.unlink(missing_ok=True)
+        return [found[k].result() for k in sorted(found)]
+
+    @property
+    def _worth(self) -> bool:
+        """Whether there was enough work for other processes to pay."""
+        return self._given or (self._seconds >= PAYS and self._killed < KILLED)
+
+    def _room(self, left: int, digest: str, data: bytes) -> int:
+        """Most pieces that others may have at a time: one for each, and a next one as long as many are left. They learn what a piece needs
+        while this process works."""
+        if self._given:
+            return left
+        if not self._worth or not data:
+            return 0
+        if digest not in self._taught:
+            self._taught[digest] = [self._submit(_learn, digest, data) for _ in range(self._count)]
+        ready = sum(one.done() for one in self._taught[digest])
+        return ready * (2 if left > 2 * self._count else 1)
+
+    def _here(self, do: Callable[..., Any], shared: Any, piece: tuple[Any, ...]) -> Future[Any]:
+        """What a piece gives in this process."""
+        done, began = Future[Any](), time.perf_counter()
+        try:
+            done.set_result(do(shared, *piece))
+        except Exception as error:
+            done.set_exception(error)
+        self._seconds += time.perf_counter() - began
+        return done
+
+    def _submit(self, do: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        if self._executor is None:
+            from loky import ProcessPoolExecutor
+
+            self._executor = ProcessPoolExecutor(max_workers=self._count, timeout=IDLE, initializer=_begin, initargs=(os.getpid(),))
+        return self._executor.submit(do, *arguments)
+
+    def _lost(self, future: Future[Any]) -> bool:
+        """Whether a piece is to be done again, since its process was killed, which is said."""
+        if not (future.cancelled() or isinstance(future.exception(), BrokenProcessPool)):
+            return False
+        if self._given:
+            raise RuntimeError("a process of the executor in `workers` was killed, perhaps for want of memory") from future.exception()
+        if self._executor is not None:
+            self._killed, self._executor = self._killed + 1, None
+            self._taught.clear()
+            log.warning("a process was killed, perhaps for want of memory: its work is done again%s", self._words)
+        return True
+
+    @property
+    def _words(self) -> str:
+        return ", by one process from now on" if self._killed >= KILLED else ""
+
+
+_HELPERS: ContextVar[Helpers | None] = ContextVar("helpers", default=None)
+_OWN: dict[int, Helpers] = {}
+"""Those of this machine by the number of processes."""
+_KEPT: OrderedDict[str, Any] = OrderedDict()
+"""In a process: what its pieces of work share, by digest."""
+
+
+def _own(count: int) -> Helpers:
+    """The processes of this machine, one of which is this one; begun once."""
+    return _OWN.setdefault(count, Helpers(count - 1))
+
+
+def _learn(digest: str, data: bytes) -> None:
+    """Prepare for pieces of work in a process, which keeps what they share."""
+    if digest not in _KEPT:
+        with work_on_trajectories():
+            _KEPT[digest] = cloudpickle.loads(data)
+        while len(_KEPT) > BATCH:
+            _KEPT.popitem(last=False)
+    _KEPT.move_to_end(digest)
+
+
+def _perform(digest: str, data: bytes, piece: tuple[Any, ...], stop: str) -> Any:
+    """One piece of work in a process."""
+    with processes(1), stopped_by(lambda: "asked to end" if Path(stop).exists() else ""), work_on_trajectories():
+        _learn(digest, data)
+        do, shared = _KEPT[digest]
+        return do(shared, *piece)
+
+
+def _begin(parent: int) -> None:
+    """Begin a process: Ctrl-C is for the one that began it, and with that one it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
