@@ -66,9 +66,10 @@ def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict
     optima k like those from which objective i was sought before, whose objectives `tried` has by (i, k)."""
     m, scales = len(optima), nlp_scales(solver.nlp)
     for _ in range(ENDS.rounds):
-        spans, pairs = _spans(optima), list[tuple[int, int]]()
+        known = [k for k in range(m) if optima[k].status == CONVERGED]
+        spans, pairs = _spans(optima) if known else np.zeros(m), list[tuple[int, int]]()
         for i, k in permutations(range(m), 2):
-            if optima[k].status != CONVERGED or solver.convex[i] or solver.is_least(optima[i], Scalarised.single(i, m)):
+            if k not in known or solver.convex[i] or solver.is_least(optima[i], Scalarised.single(i, m)):
                 continue
             if (i, k) not in tried or (np.abs(optima[k].F - tried[i, k]) > ENDS.loose * spans).any():
                 tried[i, k] = optima[k].F

@@ -272,7 +272,7 @@ def test_a_search_is_not_lost_if_its_points_cannot_be_simulated(monkeypatch, cap
     def fails(*_, **__):
         raise RuntimeError("no\nair")
 
-    monkeypatch.setattr("macs.fronts.verified.simulate_all", fails)
+    monkeypatch.setattr("macs.fronts.verified.simulate", fails)
     front = MACS(agents=4, archive=4).solve(cart(), MESH, evaluations=40, seed=1)
     assert len(front) and not front.was_simulated.any() and "no air" in front.message and "no air" in front.table()
     assert "the search left it" in caplog.text
@@ -293,8 +293,8 @@ def test_tables_set_apart_what_is_not_verified():
 
 def test_a_trajectory_is_simulated_once(monkeypatch):
     """Also if others judge it by other ranges."""
-    seen, simulate_all = [], module.simulate_all
-    monkeypatch.setattr(module, "simulate_all", lambda problem, those, **about: seen.extend(those) or simulate_all(problem, those, **about))
+    seen, simulate = [], module.simulate
+    monkeypatch.setattr(module, "simulate", lambda problem, one, **about: seen.append(one) or simulate(problem, one, **about))
     front = points(cart(), *constant(0.5, 1.0, 1.5))
     simulations = Simulations(front.compiled(), VERIFY)
     first = verified(front[[0, 2]], VERIFY, simulations=simulations)

@@ -94,7 +94,7 @@ def test_solves_for_times_at_their_bounds():
     start = nlp.first_guess(0.5 * (nlp.lower + nlp.upper)[nlp.free][None])[0]
     held = solver.solves(nlp, start, task, held=nlp.times)
     assert held.status == "converged" and held.z[column] == 2.0
-    assert solver.from_times(start, task, nlp.upper[nlp.times]).F[0] == pytest.approx(-1.0, abs=1e-6)
+    assert solver.from_times(start, task, [nlp.upper[nlp.times]])[0].F[0] == pytest.approx(-1.0, abs=1e-6)
 
 
 def swing(tf: tuple[float, float] | float = (1.0, 20.0), cubic: float = 0.0, t0: tuple[float, float] | float = 0.0, **others) -> Problem:

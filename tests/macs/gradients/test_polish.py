@@ -171,9 +171,10 @@ class Asking:
         self.found: list[np.ndarray] = []
 
     def _descend(self, starts, references, weights, margins) -> tuple[Evaluation, int]:
-        if stopping():
+        some = slice(next((k for k in range(len(starts)) if stopping()), len(starts)))
+        if not len(starts[some]):
             return Evaluation(starts[:0], references[:0], np.empty(0), np.empty(0, dtype=str)), 0
-        found, iterations = super()._descend(starts, references, weights, margins)  # type: ignore[misc]
+        found, iterations = super()._descend(starts[some], references[some], weights[some], margins)  # type: ignore[misc]
         self.found.extend(found.F)
         return found, iterations
 
@@ -313,8 +314,8 @@ class Answers:
         self.F, self.starts = iter(np.array(F)), []
 
     def descend(self, starts, references, weights) -> Evaluation:
-        self.starts.append(starts[0])
-        return Evaluation(starts + 100.0, next(self.F)[None], np.zeros(1), np.array([CONVERGED]))
+        self.starts.extend(starts)
+        return Evaluation(starts + 100.0, np.array([next(self.F) for _ in starts]), np.zeros(len(starts)), np.array([CONVERGED] * len(starts)))
 
 
 def test_where_all_starts_are_alike_none_is_made_from_neighbours() -> None:

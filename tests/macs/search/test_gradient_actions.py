@@ -107,15 +107,15 @@ def test_where_the_way_is_chosen_solves_find_points_along_the_front(monkeypatch)
     assert state.ideal[0] == pytest.approx(2 / np.sqrt(5), rel=1e-2), "full thrust, then none: 2 sqrt(1 / 5)"
     # Ends that were alike are not sought again where others were not; no other start finds a worse optimum.
     assert state.gradients.unimodal.all() and not state.gradients.multimodal
-    rng, tasks, original = np.random.default_rng(1), [], MultistartSolver.from_vector
+    rng, tasks, original = np.random.default_rng(1), [], MultistartSolver.from_vectors
     found, worse = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, state.gradients.unimodal, rng)
     assert not worse and len(found.F) >= 6
 
-    def noted(self, start, task):
-        tasks.append(np.flatnonzero(task.weights).tolist())
-        return original(self, start, task)
+    def noted(self, begun):
+        tasks.extend(np.flatnonzero(task.weights).tolist() for _, task in begun)
+        return original(self, begun)
 
-    monkeypatch.setattr(MultistartSolver, "from_vector", noted)
+    monkeypatch.setattr(MultistartSolver, "from_vectors", noted)
     for alike, ends in (([True, True], [[0], [1], [0], [1]]), ([True, False], [[1]] * 4)):
         tasks.clear()
         gradient_actions.restart_solves(state.archive, evaluator, 6, 6, 0, np.array(alike), np.random.default_rng(1))
