@@ -315,7 +315,9 @@ class Answers:
 
     def descend(self, starts, references, weights) -> Evaluation:
         self.starts.extend(starts)
-        return Evaluation(starts + 100.0, np.array([next(self.F) for _ in starts]), np.zeros(len(starts)), np.array([CONVERGED] * len(starts)))
+        return Evaluation(
+            starts + 100.0, np.array([next(self.F) for _ in starts]), np.zeros(len(starts)), np.array([CONVERGED] * len(starts))
+        )
 
 
 def test_where_all_starts_are_alike_none_is_made_from_neighbours() -> None:

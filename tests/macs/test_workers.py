@@ -1,0 +1,104 @@
+"""Pieces of work side by side: the same results, exceptions and ends, wherever they are done."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from macs import MACS, Front, sweep
+from macs.io import workers as module
+from macs.io.workers import each, processes
+from problems import load
+from transcription import DFET
+from transcription.stopping import stopped_by, stopping
+
+
+@pytest.fixture
+def eager(monkeypatch) -> None:
+    """Other processes begin at once, and anew."""
+    monkeypatch.setattr(module, "PAYS", 0.0)
+    monkeypatch.setattr(module, "_OWN", {})
+
+
+def until(happened) -> Iterator[None]:
+    """As often as it takes, for at most a minute."""
+    limit = time.monotonic() + 60.0
+    while not happened():
+        assert time.monotonic() < limit
+        yield
+
+
+def test_results_have_the_order_of_pieces_wherever_they_are_done(eager):
+    seen = set[int]()
+    both = lambda: len(seen) == 2  # noqa: E731
+    with processes(2):
+        for _ in until(both):
+            found = each(lambda ten, k: (ten * k, os.getpid()), 10, [(k,) for k in range(20)])
+            assert [number for number, _ in found] == [10 * k for k in range(20)]
+            seen |= {process for _, process in found}
+        for _ in range(9):
+            with pytest.raises(ZeroDivisionError):
+                each(divmod, 100, [(k,) for k in (3, 0, 5, "seven", 0)])
+
+
+def test_an_executor_does_all_of_the_work():
+    with ThreadPoolExecutor(2) as threads, processes(threads):
+        assert each(divmod, 100, [(k,) for k in range(1, 20)]) == [divmod(100, k) for k in range(1, 20)]
+        assert threading.get_ident() not in each(lambda _, k: threading.get_ident(), None, [(k,) for k in range(9)])
+        with pytest.raises(ZeroDivisionError):
+            each(divmod, 100, [(k,) for k in (3, 0, 5, "seven", 0)])
+
+
+def test_where_the_work_is_to_end_pieces_are_asked_to():
+    threads = ThreadPoolExecutor(1)
+
+    def until_asked(_: None, number: int) -> int:
+        while not stopping():
+            pass
+        return number
+
+    asked = iter([False] * 3 + [True] * 10**6)
+    with threads, processes(threads), stopped_by(lambda: next(asked)):
+        assert each(until_asked, None, [(0,), (1,)]) == [0, 1]
+
+
+@pytest.mark.slow
+def test_what_a_killed_process_had_is_done_again(eager, caplog):
+    """At the second time by this process alone."""
+
+    def killed_elsewhere(own: int, number: int) -> int:
+        if os.getpid() != own:
+            os._exit(1)
+        return number
+
+    with caplog.at_level(logging.WARNING), processes(2):
+        for _ in until(lambda: len(caplog.records) == module.KILLED):
+            assert each(killed_elsewhere, os.getpid(), [(k,) for k in range(4)]) == [0, 1, 2, 3]
+        assert each(killed_elsewhere, os.getpid(), [(k,) for k in range(4)]) == [0, 1, 2, 3]
+    assert [record.getMessage().endswith("by one process from now on") for record in caplog.records] == [False, True]
+
+
+@pytest.mark.parametrize("wrong", [0, -1, 1.5, True, "some"])
+def test_what_is_no_number_of_processes_is_refused_before_any_work(wrong):
+    with pytest.raises(ValueError, match=r"workers must be a whole number of at least 1, 'all' or a concurrent\.futures\.Executor"):
+        sweep(load("goddard"), points=3, workers=wrong)
+
+
+@pytest.mark.slow
+def test_the_same_bits_with_any_number_of_processes(eager):
+    def fronts(workers: int) -> list[Front]:
+        problem = load("goddard")
+        return [sweep(problem, DFET(4, 4), points=6, workers=workers), MACS().solve(problem, seed=3, workers=workers)]
+
+    first = fronts(1)
+    for count in (2, 3):
+        for one, other in zip(first, fronts(count), strict=True):
+            assert one.F.tobytes() == other.F.tobytes() and one.stats["work"] == other.stats["work"]
+            assert np.array_equal(one.simulated_F, other.simulated_F)
