@@ -36,12 +36,6 @@ ALL = "all"
 BATCH = 8
 """Most pieces that a method begins together before it looks at their results, where it decides by these: a part of the method, so that the
 number of processes changes nothing."""
-PAYS = 1.0
-"""Seconds of work after which further processes begin: about what that takes."""
-IDLE = 300.0
-"""Seconds without work after which a process ends."""
-KILLED = 2
-"""How often a process may be killed until this one works alone."""
 
 
 def check_workers(workers: Workers | None) -> None:
@@ -132,8 +126,8 @@ class Helpers:
 
     @property
     def _worth(self) -> bool:
-        """Whether there was enough work for other processes to pay."""
-        return self._given or (self._seconds >= PAYS and self._killed < KILLED)
+        """Whether there was enough work for other processes to pay: a second is what it takes to begin them. Killed twice, they do not."""
+        return self._given or (self._seconds >= 1.0 and self._killed < 2)
 
     def _room(self, left: int, digest: str, data: bytes) -> int:
         """Most pieces that others may have at a time: one for each, and a next one as long as many are left. They learn what a piece needs
@@ -161,7 +155,7 @@ class Helpers:
         if self._executor is None:
             from loky import ProcessPoolExecutor
 
-            self._executor = ProcessPoolExecutor(max_workers=self._count, timeout=IDLE, initializer=_begin, initargs=(os.getpid(),))
+            self._executor = ProcessPoolExecutor(max_workers=self._count, timeout=300.0, initializer=_begin, initargs=(os.getpid(),))
         return self._executor.submit(do, *arguments)
 
     def _lost(self, future: Future[Any]) -> bool:
@@ -173,12 +167,9 @@ class Helpers:
         if self._executor is not None:
             self._killed, self._executor = self._killed + 1, None
             self._taught.clear()
-            log.warning("a process was killed, perhaps for want of memory: its work is done again%s", self._words)
+            words = "" if self._worth else ", by one process from now on"
+            log.warning("a process was killed, perhaps for want of memory: its work is done again%s", words)
         return True
-
-    @property
-    def _words(self) -> str:
-        return ", by one process from now on" if self._killed >= KILLED else ""
 
 
 _HELPERS: ContextVar[Helpers | None] = ContextVar("helpers", default=None)

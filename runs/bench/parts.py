@@ -11,6 +11,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from scipy.stats import t
 
 from macs import MACS, Front
 from macs.io.console import Steps
@@ -28,8 +29,6 @@ from .functions import from_pymoo
 
 WHOLE = "all parts"
 FIRST_SEED = 101
-STUDENT = 2.26
-"""Quantile of Student's distribution: the mean of ten differences is within so many standard errors in 95 % of cases."""
 
 Switch = tuple[dict[str, Any], Callable[[], AbstractContextManager[Any]]]
 """Settings of MACS, and a context, with which a part is off."""
@@ -218,7 +217,7 @@ def _row(kind: str, part: str, gains: Sequence[Mapping[str, list[tuple[float, fl
 def noise(row: Row) -> float:
     """Half of the interval in which the mean gain lies in 95 % of cases."""
     gain = np.array(row.values["gain"])
-    return float(STUDENT * gain.std(ddof=1) / len(gain) ** 0.5) if len(gain) > 1 else np.inf
+    return float(t.ppf(0.975, len(gain) - 1) * gain.std(ddof=1) / len(gain) ** 0.5) if len(gain) > 1 else np.inf
 
 
 def verdict(row: Row) -> str:

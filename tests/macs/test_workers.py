@@ -14,7 +14,7 @@ import pytest
 
 from macs import MACS, Front, sweep
 from macs.io import workers as module
-from macs.io.workers import each, processes
+from macs.io.workers import Helpers, each, processes
 from problems import load
 from transcription import DFET
 from transcription.stopping import stopped_by, stopping
@@ -23,8 +23,8 @@ from transcription.stopping import stopped_by, stopping
 @pytest.fixture
 def eager(monkeypatch) -> None:
     """Other processes begin at once, and anew."""
-    monkeypatch.setattr(module, "PAYS", 0.0)
     monkeypatch.setattr(module, "_OWN", {})
+    monkeypatch.setattr(Helpers, "_worth", property(lambda self: self._killed < 2))
 
 
 def until(happened) -> Iterator[None]:
@@ -79,7 +79,7 @@ def test_what_a_killed_process_had_is_done_again(eager, caplog):
         return number
 
     with caplog.at_level(logging.WARNING), processes(2):
-        for _ in until(lambda: len(caplog.records) == module.KILLED):
+        for _ in until(lambda: len(caplog.records) == 2):
             assert each(killed_elsewhere, os.getpid(), [(k,) for k in range(4)]) == [0, 1, 2, 3]
         assert each(killed_elsewhere, os.getpid(), [(k,) for k in range(4)]) == [0, 1, 2, 3]
     assert [record.getMessage().endswith("by one process from now on") for record in caplog.records] == [False, True]
