@@ -13,7 +13,7 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED
-from ..io.workers import BATCH
+from ..io.workers import TOGETHER
 from ..pareto.directions import divisions_below, simplex_lattice
 from .multistart import MULTISTART, MultistartSolver
 from .scalarised import END, WEAK, WORK, Scalarised, strongly_optimal, without_loss
@@ -162,11 +162,11 @@ def _from_rivals(solver: MultistartSolver, tasks: Sequence[Scalarised], found: l
 def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved], limit: float) -> bool:
     """Solve each task from another start; returns whether any result was replaced."""
     replaced = False
-    for k in range(0, len(tasks), BATCH):
+    for k in range(0, len(tasks), TOGETHER):
         if solver.drawn_enough or solver.convex.all() or solver.solves.counts.work >= limit or stopping():
             return False
         with solver.solves.at_most(MULTISTART.iterations):
-            others = solver.from_draws(tasks[k : k + BATCH], found[k : k + BATCH])
+            others = solver.from_draws(tasks[k : k + TOGETHER], found[k : k + TOGETHER])
         for i, other in enumerate(others, k):
             alpha, known = tasks[i].optimum(other), tasks[i].optimum(found[i])
             if alpha is not None and (known is None or alpha < known - MULTISTART.clearly):

@@ -24,7 +24,7 @@ from transcription.smooth import Smooth
 from transcription.stopping import Stopped, stopping
 
 from ..evaluation.evaluator import CONVERGED
-from ..io.workers import BATCH
+from ..io.workers import TOGETHER
 from ..pareto.archive import Archive
 from .scalarised import WORK, GradientSolves, Scalarised
 
@@ -312,7 +312,7 @@ class MultistartSolver:
                     else:
                         cost = float(np.mean([one.iterations for one in (best, *found)])) * len(self.nlp.variables)
                         paid, room = max(left / max(cost, 1.0), 1.0), self.most - self._starts.drawn
-                        count = int(min(BATCH, stopping_rule.needed, room, paid))
+                        count = int(min(TOGETHER, stopping_rule.needed, room, paid))
                         new = self.from_draws([task] * count, [best] * count if converged else ())
                 found += new
                 # One that is hardly better is the same optimum: that of the first start is as good.

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
-from ..io.workers import BATCH
+from ..io.workers import TOGETHER
 from ..pareto.archive import Archive
 from ..pareto.directions import across, divisions_below, simplex_lattice
 from ..pareto.dominance import BETTER, CURVE, among, distinct, extremes, feasible_and_no_worse, nearest, ranges, slack
@@ -357,8 +357,8 @@ class BudgetedSolves:
         violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
         tasks = [b"".join(part[row].tobytes() for part in (starts, references, weights)) for row in range(len(starts))]
         new = [row for row, task in enumerate(tasks) if task not in self._answers and task not in tasks[:row]]
-        for k in range(0, len(new), BATCH):
-            if not (some := new[k : k + min(BATCH, self._allowed)]):
+        for k in range(0, len(new), TOGETHER):
+            if not (some := new[k : k + min(TOGETHER, self._allowed)]):
                 break
             found = self._solve(starts[some], references[some], weights[some])
             self._answers |= {tasks[row]: found.take(slice(i, i + 1)) for i, row in enumerate(some[: len(found.F)])}

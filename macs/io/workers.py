@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 Result = TypeVar("Result")
 Workers = int | str | Executor
 ALL = "all"
-BATCH = 8
+TOGETHER = 8
 """Most pieces that a method begins together before it looks at their results, where it decides by these: a part of the method, so that the
 number of processes changes nothing."""
 
@@ -189,7 +189,7 @@ def _learn(digest: str, data: bytes) -> None:
     if digest not in _KEPT:
         with work_on_trajectories():
             _KEPT[digest] = cloudpickle.loads(data)
-        while len(_KEPT) > BATCH:
+        while len(_KEPT) > TOGETHER:
             _KEPT.popitem(last=False)
     _KEPT.move_to_end(digest)
 

@@ -22,7 +22,7 @@ from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_bet
 from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
-from ..io.workers import BATCH
+from ..io.workers import TOGETHER
 from ..pareto.archive import Archive
 from ..pareto.dominance import CURVE, extremes, feasible_and_no_worse, nearest, ranges
 from ..pareto.spread import Guide
@@ -155,7 +155,7 @@ def restart_solves(
     found, worse = list[Solved](), False
     while len(found) < count and not stopping():
         tasks, starts = list[Scalarised](), list[np.ndarray]()
-        for k in range(drawn + len(found), drawn + min(len(found) + BATCH, count)):
+        for k in range(drawn + len(found), drawn + min(len(found) + TOGETHER, count)):
             # Ends are what points between them follow: two starts for these, and one for one of those, in turn.
             inner = bool(between) and k % 3 == 2
             turn, which = divmod(k // 3, len(between)) if inner else divmod(k - k // 3 if between else k, len(singles))

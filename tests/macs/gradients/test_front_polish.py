@@ -10,7 +10,7 @@ from synthetic_fronts import black_box
 
 from macs import NSGA2, Front
 from macs.evaluation.bilevel import Bilevel
-from macs.io.workers import BATCH
+from macs.io.workers import TOGETHER
 from problems import load
 from problems.cases.goddard import reference
 from transcription import DFET, SingleShooting
@@ -85,7 +85,9 @@ def test_an_interruption_leaves_what_was_found(rough, monkeypatch):
 
     monkeypatch.setattr(Bilevel, "_descend", refine)
     found = rough.polished(FINE, solves=50)
-    assert 2 <= found.stats["gradient_solves"] <= 2 * BATCH and found.stats["stopped"] == "interrupted" and not found.stats["reproducible"]
+    assert (
+        2 <= found.stats["gradient_solves"] <= 2 * TOGETHER and found.stats["stopped"] == "interrupted" and not found.stats["reproducible"]
+    )
     assert any(point.transcription == FINE.to_dict() for point in found) and len(found) == len(rough)
 
 
