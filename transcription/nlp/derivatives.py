@@ -77,7 +77,11 @@ def convex_objectives(nlp: NLP) -> np.ndarray:
         slight = 1e-9 * np.abs(H.data).max(initial=0.0)
         alike = np.abs((H - curved(other, np.eye(m)[i], 0.0)).data).max(initial=0.0) <= slight
         found[i] = alike and all(least >= -slight for least in _least_eigenvalues(H))
-    return found
+    # A kink is in no second derivative: between two places, no objective may be larger than on the line that joins its values there.
+    Z = lower + rng.random((16, len(lower))) * (upper - lower)
+    Z[:, nlp.times] = first[nlp.times]
+    ends, between = nlp.evaluate(Z)[0], nlp.evaluate(0.5 * (Z[1:] + Z[:-1]))[0]
+    return found & ~(between > 0.5 * (ends[1:] + ends[:-1]) + 1e-9 * np.abs(ends).max(axis=0)).any(axis=0)
 
 
 def _least_eigenvalues(upper: csr_matrix) -> Iterator[float]:

@@ -118,7 +118,7 @@ def test_which_objectives_are_convex_for_a_given_time():
     others = {
         "concave": lambda phase: -phase.integral(phase["u"] ** 2),
         "steep": lambda phase: phase.integral(phase["u"] ** 4),
-        "kinked": lambda phase: -ca.fabs(phase.final(phase["x"])),
+        "kinked": lambda phase: -phase.integral(ca.fabs(phase["u"])),
     }
     assert convex_objectives(DFET(4, 3).nlp(swing(**others))).tolist() == [True, True, False, False, False]
     assert convex_objectives(DFET(4, 3).nlp(swing(t0=(0.0, 0.5)))).tolist() == [False] * 2
