@@ -13,7 +13,8 @@ import casadi as ca
 import numpy as np
 
 COMPARISONS = (ca.OP_LT, ca.OP_LE)
-STEPPED = (*COMPARISONS, ca.OP_SIGN, ca.OP_EQ, ca.OP_NE, ca.OP_FLOOR, ca.OP_CEIL)
+REMAINDERS = (ca.OP_FMOD, ca.OP_REMAINDER)
+STEPPED = (*COMPARISONS, ca.OP_SIGN, ca.OP_EQ, ca.OP_NE, ca.OP_FLOOR, ca.OP_CEIL, *REMAINDERS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ def switching(groups: Mapping[str, Sequence[ca.MX]], expressions: Sequence[ca.MX
     firsts = [kind[0] for kind in kinds]
     w = ca.MX.sym("w", sum(node.numel() for node in firsts))
     parts = ca.vertsplit(w, np.cumsum([0, *(node.numel() for node in firsts)]).tolist())
-    pairs = [(node, ca.reshape(part, node.shape)) for kind, part in zip(kinds, parts, strict=True) for node in kind]
+    pairs = [(node, _at(node, ca.reshape(part, node.shape))) for kind, part in zip(kinds, parts, strict=True) for node in kind]
     (sides,) = ca.graph_substitute([column], *(list(one) for one in zip(*pairs, strict=True)))
     zeros = [_difference(node) for node in firsts]
     labels = [_text(node) for node in firsts for _ in range(node.numel())]
@@ -51,7 +52,7 @@ def switching(groups: Mapping[str, Sequence[ca.MX]], expressions: Sequence[ca.MX
     scalars = [symbol for symbols in groups.values() for symbol in symbols]
     entries = [vector[i] for vector, symbols in zip(inputs, groups.values(), strict=True) for i in range(len(symbols))]
     differences = [ca.MX.ones(*node.shape) if zero is None else zero for zero, node in zip(zeros, firsts, strict=True)]
-    flat = ca.vertcat(*(ca.densify(ca.vec(one)) for one in (*firsts, *differences)))
+    flat = ca.vertcat(*(ca.densify(ca.vec(one)) for one in (*map(_step, firsts), *differences)))
     found, sides = ca.substitute([flat, ca.densify(sides)], scalars, entries)
     return Switching(tuple(labels), tuple(words), ca.Function("switches", inputs, [found]), ca.Function("sides", [*inputs, w], [sides]))
 
@@ -79,6 +80,19 @@ def _difference(node: ca.MX) -> ca.MX | None:
     if node.op() in COMPARISONS:
         return node.dep(0) - node.dep(1)
     return node.dep(0) if node.op() == ca.OP_SIGN else None
+
+
+def _step(node: ca.MX) -> ca.MX:
+    """The value of a node that is constant between its switches: of a remainder, the quotient, rounded."""
+    if node.op() not in REMAINDERS:
+        return node
+    quotient = node.dep(0) / node.dep(1)
+    return ca.sign(quotient) * ca.floor(ca.fabs(quotient)) if node.op() == ca.OP_FMOD else ca.floor(quotient + 0.5)
+
+
+def _at(node: ca.MX, step: ca.MX) -> ca.MX:
+    """A node where that value is a given one."""
+    return node.dep(0) - node.dep(1) * step if node.op() in REMAINDERS else step
 
 
 def _text(expression: ca.MX) -> str:

@@ -48,6 +48,9 @@ def further(rate):
         (lambda x, u, t: ca.sign(x - 0.3), 0.6, "sign((x-0.3))"),
         (lambda x, u, t: ca.floor(10 * x + 5.5), 0.1, "floor"),
         (lambda x, u, t: ca.conditional(ca.floor(2.5 * x), [1.0, 2.0], 3.0), 0.8, "floor((2.5*x))"),
+        (lambda x, u, t: ca.fmod(x, 0.3), 0.6, "fmod(x,0.3)"),
+        (lambda x, u, t: x * ca.fmod(x - 1.0, 0.6), 0.8, "fmod("),  # of a negative number
+        (lambda x, u, t: ca.remainder(x, 0.3), 0.3, "remainder(x,0.3)"),
     ],
 )
 def test_a_rate_that_jumps_is_found_where_it_does(rate, time, words):
@@ -82,6 +85,8 @@ def test_a_control_may_cross_where_it_jumps():
         lambda x, u, t: ca.if_else(x < 0.0, 2.0, 1.0),
         lambda x, u, t: ca.sign(x - 0.3) * (x - 0.3),
         lambda x, u, t: ca.if_else(t > 0.3, 2.0, 1.0),
+        lambda x, u, t: ca.fabs(ca.remainder(x, 0.3)) + ca.sin(2 * ca.pi * ca.fmod(x, 0.3) / 0.3),
+        lambda x, u, t: ca.fmod(x - 0.3, 2.0) + ca.fmod(t, 0.3),
     ],
 )
 def test_kinks_sides_that_are_not_left_and_times_are_no_jumps(rate):
