@@ -44,7 +44,9 @@ def switching(groups: Mapping[str, Sequence[ca.MX]], expressions: Sequence[ca.MX
     w = ca.MX.sym("w", sum(node.numel() for node in firsts))
     parts = ca.vertsplit(w, np.cumsum([0, *(node.numel() for node in firsts)]).tolist())
     pairs = [(node, _at(node, ca.reshape(part, node.shape))) for kind, part in zip(kinds, parts, strict=True) for node in kind]
-    (sides,) = ca.graph_substitute([column], *(list(one) for one in zip(*pairs, strict=True)))
+    sides, stepped = column, {node.__hash__() for node, _ in pairs}
+    while stepped & {node.__hash__() for node in nodes(sides)}:  # there may be remainders of remainders
+        (sides,) = ca.graph_substitute([sides], *(list(one) for one in zip(*pairs, strict=True)))
     zeros = [_difference(node) for node in firsts]
     labels = [_text(node) for node in firsts for _ in range(node.numel())]
     words = ["" if zero is None else _text(zero) for zero, node in zip(zeros, firsts, strict=True) for _ in range(node.numel())]

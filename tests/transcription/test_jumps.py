@@ -51,6 +51,7 @@ def further(rate):
         (lambda x, u, t: ca.fmod(x, 0.3), 0.6, "fmod(x,0.3)"),
         (lambda x, u, t: x * ca.fmod(x - 1.0, 0.6), 0.8, "fmod("),  # of a negative number
         (lambda x, u, t: ca.remainder(x, 0.3), 0.3, "remainder(x,0.3)"),
+        (lambda x, u, t: ca.fmod(1.0 + ca.fmod(x, 0.3), 5.0), 0.6, "fmod(x,0.3)"),
     ],
 )
 def test_a_rate_that_jumps_is_found_where_it_does(rate, time, words):
