@@ -48,7 +48,6 @@ class FrontLimits:
     of_end: float = 6.0  # what an end may take of the work that is allowed, in equal shares of it
     of_one: float = 2.0  # the same for any other point
     neighbours: int = 2  # points whose trajectories are further starts of one
-    patience: int = 250  # most iterations of a solve on one finer mesh for all: from a trajectory nearby most take some tens
 
 
 FRONT = FrontLimits()

@@ -46,7 +46,6 @@ class MendingLimits:
     each: float = 100.0  # iterations for each point that is missed that are allowed even then: enough for one more mesh
     # Work that is always allowed, about a second, since a mesh that is coarse for its search is refined to many times its variables.
     least: float = 2e5
-    ends: float = 0.25  # work on verified ends that other controls would improve, as a part of what the front cost
     slightly: float = 0.1  # excess over limits, in their scales, up to which a point is rather moved inside of them
     loss: float = 5e-3  # what that may cost in each objective, in ranges of the front
     starts: int = 2  # verified points from which a solve for a further one is tried
@@ -145,11 +144,11 @@ class _Mending:
         again = self._refined(again, self._meshed(again, again.was_simulated & ((fine is not None) | ~again.verified)), fine)
         again = self.with_ends(again)
         gaining, ends = self._meshed(again, again.verified & (again.gain > self._gain)), list[int]()
-        if self.points.stats["evaluations"] and gaining:
-            # Where work is limited, the ends come first.
+        if self.ends is not None and self.points.stats["evaluations"] and gaining:
+            # Where work is limited, the ends come first, if meshes are sought for these.
             good = np.flatnonzero(again.verified)
             ends = [i for i in gaining if i in good[extremes(again.simulated_F[good])]]
-            again = self._refined(again, ends, None, MENDING.ends)
+            again = self._refined(again, ends, None, MENDING.share)
         again = self._refined(again, [i for i in gaining if i not in ends])
         # On a finer mesh, too, a point may exceed limits between nodes, and by less.
         old = set(map(id, tried.trajectories))
