@@ -23,10 +23,10 @@ from problems.compiled import Limit, Objective, Variable
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 from transcription.numerics.polynomials import BASES
 from transcription.trajectories.costates import Costates, PhaseCostates
-from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory, ran_over
 
 from ..io.netcdf import COUNT, NUMBER, TEXT, FileArray, Group, Labelled, words
-from ..io.text import document, ran_over
+from ..io.text import document
 from .columns import (
     checked,
     distinct,

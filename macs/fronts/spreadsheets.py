@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from transcription.trajectories.costates import Costates, has_length
-from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory
+from transcription.trajectories.trajectory import PhaseTrajectory, Trajectory, ran_over
 
 from ..io.atomic import write_whole
-from ..io.text import label, per, ran_over
+from ..io.text import label, per
 
 
 def save_csv(front: Any, path: str | PathLike[str]) -> None:

@@ -17,7 +17,7 @@ from transcription.trajectories.jumps import UNTRUSTED
 from transcription.trajectories.limits import excess
 from transcription.trajectories.simulate import Simulation, defect_of_elements, simulate, simulate_all, worst_violation
 from transcription.trajectories.tables import rough_tables
-from transcription.trajectories.trajectory import Trajectory
+from transcription.trajectories.trajectory import Trajectory, moment
 
 from ..evaluation.blackbox import evaluated_again
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
@@ -100,7 +100,8 @@ def _divergence(simulation: Simulation) -> str:
         if not finite.all():
             edges, first = phase.state.edges, int(np.argmin(finite))
             j = int(np.clip(np.searchsorted(edges, phase.time[first], side="right") - 1, 0, len(edges) - 2))
-            where = f"it diverges in phase '{phase.name}' between t = {edges[j]:.4g} and {edges[j + 1]:.4g} {phase.time_unit}".rstrip()
+            between = moment(f"{edges[j]:.4g} and {edges[j + 1]:.4g}", phase.time_unit)
+            where = f"it diverges in phase '{phase.name}' between {between}"
             last = phase.states[max(first - 1, 0)]
             k = int((np.abs(last) / [v.span or 1.0 for v in phase.state_variables]).argmax())
             v, outside = phase.state_variables[k], excess(last[None], phase.state_variables)[k] > 0.0

@@ -71,15 +71,6 @@ def label(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-LENGTHS, ANGLES = {"m", "km", "cm", "mm", "ft", "mi", "nmi", "AU"}, {"rad", "deg", "°", "rev"}
-"""Units by which a phase runs over something else than time."""
-
-
-def ran_over(unit: str) -> str:
-    """What a phase runs over, by its `time_unit`."""
-    return "distance" if unit in LENGTHS else "angle" if unit in ANGLES else "time"
-
-
 def per(unit: str) -> str:
     """Unit of what is per unit of something, such as a costate; empty if it has none."""
     return f"per {unit}" if unit else ""

@@ -13,10 +13,10 @@ from macs.front import Front
 from macs.fronts.pictures.flight_plot import costate_ranges
 from macs.fronts.point import Point
 from macs.fronts.tables import footer, headline
-from macs.io.text import per, ran_over
+from macs.io.text import per
 from problems.compiled import Limit, Objective, Variable
 from transcription.trajectories.costates import Costates, has_length
-from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
+from transcription.trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory, ran_over
 
 
 @dataclass(frozen=True)

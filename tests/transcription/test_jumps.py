@@ -9,6 +9,7 @@ import pytest
 from macs import MACS, optimize
 from problems import Phase, Problem
 from transcription import DFET
+from transcription.trajectories.jumps import Jump
 from transcription.trajectories.simulate import simulate
 
 INNER = ca.MX.sym("z")
@@ -125,6 +126,11 @@ def test_what_a_gradient_solver_takes_for_an_optimum_is_not_verified():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("unit", "words"), [("s", "at t = 0.3 s: "), ("km", "at distance 0.3 km: "), ("deg", "at angle 0.3 deg: ")])
+def test_what_a_phase_runs_over_is_named_by_its_unit(unit, words):
+    assert words in str(Jump("run", 0.3, unit, "(0<x)", "x", "crosses"))
+
+
 def test_a_search_solves_no_jump_again():
     front = MACS().solve(media(), DFET(4, 3), evaluations=20, seed=1)
     assert not front.verified.any() and "mended" not in front.table() and "is not to be trusted" in front.table()

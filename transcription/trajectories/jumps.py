@@ -10,6 +10,7 @@ from problems.compiled import CompiledPhase, remembered
 
 from ..numerics.batched import Batched, expanded
 from .limits import DENSE, NEGLIGIBLE_EXCESS, Course
+from .trajectory import moment
 
 UNTRUSTED = "the optimum is not to be trusted"
 """Words by which a jump is known in a point's note: no finer mesh cures it."""
@@ -31,7 +32,7 @@ class Jump:
     def __str__(self) -> str:
         zero, junction = f"{self.difference} = 0, where {self.expression} switches", f", and {self.difference} = 0 where they meet"
         place = zero if self.difference else f"the switch of {self.expression}"
-        when = f"phase '{self.phase}' has a jump at t = {self.time:.5g} {self.time_unit}".rstrip()
+        when = f"phase '{self.phase}' has a jump at {moment(f'{self.time:.5g}', self.time_unit)}"
         return (
             f"{when}: it {self.how} {place}, no derivative shows that, and {UNTRUSTED}. State two linked phases, with the values of "
             f"both sides in place of {self.expression}, a path constraint that keeps each on its side"

@@ -12,7 +12,7 @@ from problems.compiled import CompiledPhase, CompiledProblem, remembered
 from problems.switching import inlined, nodes
 
 from ..numerics.batched import Batched
-from .trajectory import PhaseTrajectory, Trajectory
+from .trajectory import PhaseTrajectory, Trajectory, moment
 
 TABLES = ("LinearInterpolant", "BSplineInterpolant")
 FINE = np.linspace(-1.0, 1.0, 257)
@@ -38,7 +38,7 @@ class Rough:
 
     def __str__(self) -> str:
         of = f"'{self.state}'" if self.unit is not None else f"an expression of '{self.state}'"
-        when = f"most often near t = {self.time:.4g} {self.time_unit}".rstrip()
+        when = f"most often near {moment(f'{self.time:.4g}', self.time_unit)}"
         width = f"{self.width:.2g} of that" if self.unit is None else f"{self.width:.2g} {self.unit}".rstrip()
         other = f", or make '{self.state}' the independent variable, so that elements can end at values of the table" if self.grows else ""
         return (

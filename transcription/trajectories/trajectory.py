@@ -15,6 +15,19 @@ from problems.compiled import Limit, Variable
 from ..numerics.polynomials import basis_matrix
 
 Item = TypeVar("Item")
+LENGTHS, ANGLES = {"m", "km", "cm", "mm", "ft", "mi", "nmi", "AU"}, {"rad", "deg", "°", "rev"}
+"""Units by which a phase runs over something else than time."""
+
+
+def ran_over(unit: str) -> str:
+    """What a phase runs over, by its `time_unit`."""
+    return "distance" if unit in LENGTHS else "angle" if unit in ANGLES else "time"
+
+
+def moment(at: str, unit: str) -> str:
+    """A time for messages, or a distance or an angle where a phase runs over these."""
+    over = ran_over(unit)
+    return f"{'t =' if over == 'time' else over} {at} {unit}".rstrip()
 
 
 @dataclass(frozen=True, eq=False, repr=False)

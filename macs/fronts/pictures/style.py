@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from problems.compiled import Objective
-from transcription.trajectories.trajectory import PhaseTrajectory
+from transcription.trajectories.trajectory import PhaseTrajectory, ran_over
 
 from ...evaluation.evaluator import CONVERGED
-from ...io.text import label, ran_over
+from ...io.text import label
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255")
 """Colours of Okabe and Ito, which readers with any colour vision can distinguish; wine red instead of black, which is for references."""
