@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -113,7 +114,7 @@ class _Mending:
         # Points are filled up from the first meshes, too, after others were refined.
         self.programs, self.simulations = Programs(problem, kept=MENDING.meshes), Simulations(problem, verify)
         self._solves = GradientSolves(float(points.stats["tolerance"]))
-        self._work, self._scales = points.stats.get("work", 0), None
+        self._work, self._scales, self.missing = points.stats.get("work", 0), None, ""
         self.ends = None if ends is None else self.marked(ends)
         # With ends that are known to simulate, tolerances are fixed by these; else by what the points are in the end.
         self._scales = None if self.ends is None else objective_scales(self.ends)
@@ -129,7 +130,7 @@ class _Mending:
 
     def with_costs(self, points: Points, elapsed: float, stopped: str) -> Points:
         """The points with all costs of the re-solves."""
-        message = self.points.message
+        message = " ".join(filter(None, [self.points.message, self.missing]))
         return points.replace(stats=more_costs(points.stats, self._solves.counts, elapsed, stopped), message=message)
 
     def resolve_unverified(self, fine: Meshed | None = None) -> Points:
@@ -192,38 +193,48 @@ class _Mending:
             return points
         most = self._solves.counts.work + self._most_work(points, size - int(points.verified.sum()))
         tried = np.empty((0, points.F.shape[1]))
-        fruitless = 0
+        fruitless, without, ended = 0, Counter[str](), ""
         while 0 < points.verified.sum() < size and fruitless < LOOP.patience:
             scales = objective_scales(points)
             target = _target(points, tried, scales, guide)
-            if target is None or self._solves.counts.work >= most or stopping():
+            used_up = self._solves.counts.work >= most
+            if target is None or used_up or stopping():
+                ended = "all gaps were tried" if target is None else "the work for more was used up" if used_up else "the time was over"
                 break
             tried = np.vstack([tried, target])
             rows = np.flatnonzero(points.verified)
             near = np.argsort(np.linalg.norm((points.simulated_F[rows] - target) / scales, axis=1), kind="stable")[: MENDING.starts]
-            found = (self._solved(points, int(row), Scalarised(target, scales, units=scales)) for row in rows[near])
-            new = None
+            new: Points | str = "ended with the time"
             with suppress(Stopped):  # which ends the loop
-                new = next((one for one in found if one is not None), None)
+                for row in rows[near]:
+                    new = self._solved(points, int(row), Scalarised(target, scales, units=scales))
+                    if isinstance(new, Points):
+                        break
             fruitless, before = fruitless + 1, int(points.verified.sum())
-            if new is not None:
+            if isinstance(new, Points):
                 joined = Points.concatenate([points, new]).replace(stats=points.stats, solver=points.solver)
                 joined = joined[np.flatnonzero(_needed(joined) | (target != joined.F).any(axis=1))]  # not what it takes the place of
                 points = _separate(joined[best_rows(joined)])
-                fruitless = fruitless if points.verified.sum() <= before else 0
-        return points[_within(points, size, guide)]
+                new = "no better than another point" if points.verified.sum() <= before else ""
+                fruitless = fruitless if new else 0
+            without[new] += 1
+        points, why = points[_within(points, size, guide)], ", ".join(f"{count} {why}" for why, count in without.items() if why)
+        if len(points) < size and (why or ended):
+            said = "; ".join(filter(None, [why and f"solves for more: {why}", ended]))
+            self.missing = f"{len(points)} of {size} points were found; {said}."
+        return points
 
-    def _solved(self, points: Points, row: int, task: Scalarised) -> Points | None:
-        """A verified point of the task from a point, on its mesh; None if there is none."""
+    def _solved(self, points: Points, row: int, task: Scalarised) -> Points | str:
+        """A verified point of the task from a point, on its mesh, or why there is none."""
         if not self._meshed(points, np.arange(len(points)) == row):
-            return None
+            return "had no mesh to be solved on"
         nlp = self.programs(from_dict(points[row].transcription or {}))
         solved = task.solve(self._solves, nlp, points[row].decision)
         if solved.status != CONVERGED:
-            return None
+            return "did not converge"
         found = self.marked(from_vectors(nlp, solved.z[None], points.solver, points.stats, **_judged(points[[row]])))
         found = self._as_simulated(self._inside(found, _slightly_outside(found, self.verify)), SEARCH.passable)
-        return found if found.verified[0] else None
+        return found if found.verified[0] else "not confirmed by simulation"
 
     @_unless_stopped
     def strong(self, points: Points) -> Points:
