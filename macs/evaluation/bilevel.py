@@ -19,14 +19,15 @@ from ..io.workers import each
 from .evaluator import Counts, Evaluation, Evaluator
 
 SOLVE_ITERATIONS = 100
-"""Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others."""
+"""Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others. Where all are
+long, it may take three times the mean of those that converged, up to five times these."""
 
 
 def _descended(
-    nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, margin: np.ndarray | None, tolerance: float
+    nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, margin: np.ndarray | None, tolerance: float, most: int
 ) -> Solved:
     """The result of one gradient solve."""
-    limit = SOLVE_ITERATIONS if margin is None else 2 * SOLVE_ITERATIONS
+    limit = most if margin is None else 2 * most
     settings: dict[str, Any] = {"tolerance": tolerance, "max_iterations": limit, "persistent": False}
     return scalarize(nlp, start, reference=reference, weights=weights, margin=margin, **settings)
 
@@ -95,7 +96,9 @@ class Bilevel(Evaluator):
         self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray, margins: np.ndarray | None
     ) -> tuple[Evaluation, int]:
         inside = [None] * len(starts) if margins is None else margins
-        pieces = [*zip(starts, references, weights, inside, [self.tolerance] * len(starts), strict=True)]
+        mean = self.counts.solved_iterations / max(self.counts.solved, 1)
+        most = int(np.clip(3 * mean, SOLVE_ITERATIONS, 5 * SOLVE_ITERATIONS))
+        pieces = [(*piece, self.tolerance, most) for piece in zip(starts, references, weights, inside, strict=True)]
         found = [*takewhile(lambda solved: solved.begun, each(_descended, self.nlp, pieces))]
         evaluation = Evaluation(
             Z=np.array([solved.z for solved in found]).reshape(-1, starts.shape[1]),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -178,10 +178,12 @@ class Counts:
     # programs of all sizes. Plain functions take none.
     work: int = 0
     gradient_work: int = 0  # part of the work that gradient solves took
+    solved: int = 0  # gradient solves that converged, each by itself or all of a batch, and their iterations
+    solved_iterations: int = 0
 
     __repr__ = short_repr
 
-    def add_solves(self, count: int, status: Iterable[str], iterations: int, clocked: int, variables: int) -> None:
+    def add_solves(self, count: int, status: Sequence[str], iterations: int, clocked: int, variables: int) -> None:
         """Count gradient solves with their statuses and iterations, of programs with so many variables; `clocked` of them were ended early
         by a time limit."""
         self.gradient_solves += count
@@ -190,6 +192,9 @@ class Counts:
         self.clocked += clocked
         self.work += iterations * variables
         self.gradient_work += iterations * variables
+        if all(one == CONVERGED for one in status):
+            self.solved += count
+            self.solved_iterations += iterations
 
     def joined(self, other: Counts) -> Counts:
         """The sums of these and other costs."""

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from macs import MACS
+from macs.evaluation import bilevel
 from macs.evaluation.bilevel import Bilevel
 from macs.evaluation.evaluator import Evaluation
 from macs.fronts.provenance import merged_stats, more_costs
@@ -12,6 +13,7 @@ from problems import Problem, load
 from transcription import DFET, InnerResult, InnerSolver
 from transcription.inner import Ipopt, Newton, Propagate, inner_solver
 from transcription.inner.base import newton_work, propagation_work
+from transcription.nlp.scalarized import Solved
 
 METHOD = DFET(3, 3)
 
@@ -49,6 +51,22 @@ def test_gradient_solves_count_all_their_iterations():
     assert evaluator.counts.work - before == n * (evaluator.counts.inner_iterations - iterations) > 0
     nlp = METHOD.nlp(load("goddard"))
     assert 0.0 < propagation_work(nlp) < newton_work(nlp) < 1.0
+
+
+def test_gradient_solves_may_take_longer_where_all_are_long(monkeypatch):
+    """Three times the mean of those that converged, from 100 to 500 iterations: failed ones say nothing of what it takes."""
+    evaluator, n, _ = evaluated(Newton())
+    allowed, outcomes = [], [("converged", 90), ("failed", 500), ("converged", 50), ("converged", 900), ("converged", 1)]
+
+    def scalarize(nlp, start, *, max_iterations, **_) -> Solved:
+        status, iterations = outcomes[len(allowed)]
+        allowed.append(max_iterations)
+        return Solved(start, np.zeros(2), 0.0, status, iterations)
+
+    monkeypatch.setattr(bilevel, "scalarize", scalarize)
+    for _ in outcomes:
+        evaluator.descend(np.zeros((1, n)), np.zeros((1, 2)), np.ones((1, 2)))
+    assert allowed == [100, 270, 270, 210, 500]
 
 
 @pytest.mark.slow
