@@ -173,15 +173,15 @@ class Helpers:
 
 
 _HELPERS: ContextVar[Helpers | None] = ContextVar("helpers", default=None)
-_OWN: dict[int, Helpers] = {}
-"""Those of this machine by the number of processes."""
+_OWN: dict[tuple[int, int], Helpers] = {}
+"""Those of this machine by the process that began them, since a fork has none, and the number of processes."""
 _KEPT: OrderedDict[str, Any] = OrderedDict()
 """In a process: what its pieces of work share, by digest."""
 
 
 def _own(count: int) -> Helpers:
     """The processes of this machine, one of which is this one; begun once."""
-    return _OWN.setdefault(count, Helpers(count - 1))
+    return _OWN.setdefault((os.getpid(), count), Helpers(count - 1))
 
 
 def _learn(digest: str, data: bytes) -> None:
