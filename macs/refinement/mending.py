@@ -263,14 +263,15 @@ class _Mending:
         )
 
     def _as_before(self, points: Points) -> Points:
-        """The points, with the original in place of each that was verified originally and no longer is, or lost more than its tolerance: an
-        end of the front in its own objective."""
+        """The points, with the original in place of each that was verified originally and no longer is, lost more than its tolerance, an
+        end of the front in its own objective, or has no certificate any more, since it was interrupted before that."""
         before = self.points
         lost = (points.simulated_F[: len(before)] - before.simulated_F) / objective_scales(before)
         ends = extremes(before.F)
         own = ~np.isin(np.arange(len(before)), ends)[:, None] | (ends == np.arange(len(before))[:, None])
         worse = np.where(own, lost, 0.0).max(axis=1) > self.verify
-        unsure = np.flatnonzero((~points.verified[: len(before)] | worse) & (before.verified | ~before.was_simulated)).tolist()
+        unknown = [now is None is not known for now, known in zip(points.optimality, before.optimality, strict=False)]
+        unsure = np.flatnonzero((~points.verified[: len(before)] | worse | unknown) & (before.verified | ~before.was_simulated)).tolist()
         lost = [i for i in unsure if points.trajectories[i] is not self.points.trajectories[i]]
         if not lost:
             return points

@@ -1,5 +1,6 @@
 """Points that a simulation does not confirm are solved again; the ascent's least time has a closed form."""
 
+import signal
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from macs.fronts.verification import verify
 from macs.fronts.verified import unmarked
 from macs.gradients.front_polish import KEPT_INSIDE
 from macs.refinement import mending
+from macs.refinement.mesh_loop import MeshLoop
 from problems import Problem, load
 from transcription import DFET, SingleShooting
 from transcription.stopping import Stopped, stopped_by
@@ -282,7 +284,7 @@ def two_sided_cart() -> Problem:
     return problem
 
 
-def test_points_that_other_controls_would_better_are_solved_again(tmp_path) -> None:
+def test_points_that_other_controls_would_better_are_solved_again(tmp_path, monkeypatch) -> None:
     problem = two_sided_cart()
 
     def off(front: Front) -> np.ndarray:
@@ -297,3 +299,15 @@ def test_points_that_other_controls_would_better_are_solved_again(tmp_path) -> N
     better.save(tmp_path / "cart.nc")
     again = Front.load(tmp_path / "cart.nc")
     assert [point.gain for point in again[1:3]] == pytest.approx(better.gain[1:3], rel=1e-12)
+    plain, calls = MeshLoop._solved, iter(range(100))
+
+    def interrupting(self, *arguments):
+        found = plain(self, *arguments)
+        if next(calls) == 1:
+            signal.raise_signal(signal.SIGINT)
+        return found
+
+    monkeypatch.setattr(MeshLoop, "_solved", interrupting)
+    some = coarse.mended()
+    assert some.stats["stopped"] == "interrupted" and some.verified.all() and len(some) == len(coarse)
+    assert all(point.costates is not None for point in some), "the one in work stays as it was"
