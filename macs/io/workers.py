@@ -20,6 +20,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -91,7 +92,7 @@ class Helpers:
     def each(self, do: Callable[..., Result], shared: Any, pieces: Sequence[tuple[Any, ...]]) -> list[Result]:
         """See `each` beside this class."""
         found, left, begun = dict[int, Future[Any]](), deque(range(len(pieces))), dict[Future[Any], int]()
-        data = cloudpickle.dumps((do, shared)) if self._worth else b""
+        data = self._packed(do, shared) if self._worth else b""
         digest, stop = hashlib.sha256(data).hexdigest(), Path(tempfile.gettempdir()) / f"macs-{uuid.uuid4().hex}"
         try:
             while left or begun:
@@ -129,6 +130,16 @@ class Helpers:
         """Whether there was enough work for other processes to pay: a second is what it takes to begin them. Killed twice, they do not."""
         return self._given or (self._seconds >= 1.0 and self._killed < 2)
 
+    def _packed(self, do: Callable[..., Any], shared: Any) -> bytes:
+        """What others need for pieces; none where it cannot be sent, such as a model that is called back."""
+        try:
+            return cloudpickle.dumps((do, shared))
+        except Exception as error:
+            if self._given:
+                raise
+            _alone(str(error).rsplit("\n", 1)[-1])
+            return b""
+
     def _room(self, left: int, digest: str, data: bytes) -> int:
         """Most pieces that others may have at a time: one for each, and a next one as long as many are left. They learn what a piece needs
         while this process works."""
@@ -138,8 +149,11 @@ class Helpers:
             return 0
         if digest not in self._taught:
             self._taught[digest] = [self._submit(_learn, digest, data) for _ in range(self._count)]
-        ready = sum(one.done() for one in self._taught[digest])
-        return ready * (2 if left > 2 * self._count else 1)
+        outcomes = [one.exception() for one in self._taught[digest] if one.done()]
+        if wrong := [error for error in outcomes if error is not None and not isinstance(error, BrokenProcessPool)]:
+            _alone(str(wrong[0]).rsplit("\n", 1)[-1])
+            return 0
+        return outcomes.count(None) * (2 if left > 2 * self._count else 1)
 
     def _here(self, do: Callable[..., Any], shared: Any, piece: tuple[Any, ...]) -> Future[Any]:
         """What a piece gives in this process."""
@@ -156,7 +170,12 @@ class Helpers:
             from loky import ProcessPoolExecutor
 
             self._executor = ProcessPoolExecutor(max_workers=self._count, timeout=300.0, initializer=_begin, initargs=(os.getpid(),))
-        return self._executor.submit(do, *arguments)
+        try:
+            return self._executor.submit(do, *arguments)
+        except BrokenProcessPool as error:  # since the last piece
+            broken = Future[Any]()
+            broken.set_exception(error)
+            return broken
 
     def _lost(self, future: Future[Any]) -> bool:
         """Whether a piece is to be done again, since its process was killed, which is said."""
@@ -177,6 +196,12 @@ _OWN: dict[tuple[int, int], Helpers] = {}
 """Those of this machine by the process that began them, since a fork has none, and the number of processes."""
 _KEPT: OrderedDict[str, Any] = OrderedDict()
 """In a process: what its pieces of work share, by digest."""
+
+
+@cache
+def _alone(why: str) -> None:
+    """Say once why the problem stays in this process."""
+    log.warning("one process does the work, since the problem cannot be sent to others: %s", why)
 
 
 def _own(count: int) -> Helpers:

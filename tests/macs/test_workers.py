@@ -48,6 +48,14 @@ def test_results_have_the_order_of_pieces_wherever_they_are_done(eager):
                 each(divmod, 100, [(k,) for k in (3, 0, 5, "seven", 0)])
 
 
+def test_what_cannot_be_sent_to_other_processes_stays_in_this_one(eager, caplog):
+    with caplog.at_level(logging.WARNING), processes(2):
+        for _ in range(3):
+            assert each(lambda lock, k: (lock.locked(), k), threading.Lock(), [(k,) for k in range(5)]) == [(False, k) for k in range(5)]
+    (said,) = [record.getMessage() for record in caplog.records]
+    assert said.startswith("one process does the work, since the problem cannot be sent to others: ") and "lock" in said
+
+
 def test_an_executor_does_all_of_the_work():
     with ThreadPoolExecutor(2) as threads, processes(threads):
         assert each(divmod, 100, [(k,) for k in range(1, 20)]) == [divmod(100, k) for k in range(1, 20)]
