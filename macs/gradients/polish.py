@@ -355,7 +355,8 @@ class BudgetedSolves:
         """The results of `Evaluator.descend`; rows beyond the number of solves count as failed."""
         Z, F = np.array(starts), np.full(references.shape, np.nan)
         violation, status = np.full(len(starts), np.inf), np.full(len(starts), FAILED, dtype="<U10")
-        tasks = [b"".join(part[row].tobytes() for part in (starts, references, weights)) for row in range(len(starts))]
+        rows = range(max(min(len(starts), self.left), 0))
+        tasks = [b"".join(part[row].tobytes() for part in (starts, references, weights)) for row in rows]
         new = [row for row, task in enumerate(tasks) if task not in self._answers and task not in tasks[:row]]
         for k in range(0, len(new), TOGETHER):
             if not (some := new[k : k + min(TOGETHER, self._allowed)]):

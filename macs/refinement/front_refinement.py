@@ -126,7 +126,8 @@ class FrontRefinement:
             self._refine(i, task)
 
     def _tasks(self, ends: Mapping[int, LexicographicEnd], between: Sequence[int]) -> Iterator[tuple[int, Scalarised]]:
-        """Rows with their tasks on another mesh: ends first, then the points between, which move along with these, from the nearest on."""
+        """Rows with their tasks on another mesh: ends first, then the points between, which move along with these: those that gain most, then
+        from the nearest on."""
         yield from ends.items()
         F, m = self.front.F, len(self.units)
         known = [i for i in ends if i in self.found] if len(ends) == m else []
@@ -134,7 +135,7 @@ class FrontRefinement:
         references, weights = moved_along(F[between], F[known], moved, self.units)
         left = dict(zip(between, references, strict=True))
         while left:
-            i = min(left, key=lambda j: min((self._distance(j, k) for k in self.found), default=0.0))
+            i = min(left, key=lambda j: (-self._gaining(j), min((self._distance(j, k) for k in self.found), default=0.0)))
             yield i, Scalarised(left.pop(i), weights, units=self.units)
 
     def points(self, elapsed: float, stopped: str) -> Points:
@@ -191,6 +192,11 @@ class FrontRefinement:
         certified = self.front[i].optimality
         return certified is not None and certified <= FRONT.optimal
 
+    def _gaining(self, i: int) -> float:
+        """What a point is known to gain where it begins, if that is more than it may."""
+        gain = float(self.front.gain[i])
+        return gain if gain > self.wanted.gained else 0.0
+
     def _distance(self, i: int, j: int) -> float:
         return float(np.linalg.norm((self.front.F[i] - self.front.F[j]) / self.units))
 
@@ -201,8 +207,7 @@ class FrontRefinement:
         trajectory = self._trajectory(i)
         nlp, z = self.loop.programs(self.methods[i]), point.decision
         # What gains already is to be seen where it begins.
-        gaining = self.front.gain[i] > self.wanted.gained
-        conditions = Conditions.of(nlp, z, self.units) if gaining else None
+        conditions = Conditions.of(nlp, z, self.units) if self._gaining(i) else None
         multipliers = None if conditions is None else conditions.multipliers()
         optimum = None if multipliers is None else OptimumMultipliers.at(nlp, z, multipliers)
         begun = self.loop.on_mesh(self.methods[i], z, point.F, trajectory, self.units, known, optimum)

@@ -149,9 +149,9 @@ class Solver(SearchMethod):
 
         If what follows the search fails, the front is returned as the search left it, not simulated: `message` says why.
 
-        A checkpoint is written between iterations, and between the gradient solves of a polish, at most once a second, and at the end of
-        the run. Work after the last write is done again. If the run has ended, the same call returns its front without a search; only an
-        adaptive mesh, or a polish on another transcription, is made again.
+        A checkpoint is written between iterations, and between batches of gradient solves of a polish, at most once a second, and at the
+        end of the run. Work after the last write is done again. If the run has ended, the same call returns its front without a search;
+        only an adaptive mesh, or a polish on another transcription, is made again.
 
         A checkpoint belongs to one problem, transcription, solver with its settings, inner level, tolerance, start, budget and seed; a seed
         of None takes the seed of the file. `time_limit` counts from each call; `stats["wall_time"]` is the sum of all calls. If the file

@@ -22,6 +22,7 @@ from compiled_cases import compiled
 from macs import CTAEA, MACS, MOEAD, MOPSO, MOPSOCD, NSGA2, NSGA3, RVEA, SMSEMOA, Front
 from macs.evaluation import bilevel
 from macs.gradients import polish
+from macs.io.workers import TOGETHER
 from macs.search.settings import Variant
 from macs.solvers import checkpoint
 from macs.solvers.packing import encode
@@ -193,7 +194,8 @@ def test_killed_in_the_polish(file, monkeypatch, number) -> None:
     with monkeypatch.context() as patch:
         solving = Solving(patch)
         assert_same(solve(checkpoint=file), whole)
-    assert solving.count == whole.stats["gradient_solves"] - (number - 1)  # that one was not finished
+    left = whole.stats["gradient_solves"] - (number - 1)  # that one was not finished
+    assert left <= solving.count < left + TOGETHER  # a batch that was cut short is made again
 
 
 @pytest.mark.slow
@@ -210,7 +212,8 @@ def test_interrupted_in_the_polish(file, monkeypatch, number, kept) -> None:
         with monkeypatch.context() as patch:
             solving = Solving(patch)
             assert_same(solve(checkpoint=file), whole)
-        assert solving.count == whole.stats["gradient_solves"] - number
+        left = whole.stats["gradient_solves"] - number
+        assert left <= solving.count < left + TOGETHER  # a batch that was cut short is made again
 
 
 @pytest.mark.slow
@@ -375,7 +378,7 @@ front.save("front.nc")
 def test_kill_9_in_the_polish(tmp_path) -> None:
     done, again = killed(tmp_path, POLISH, 17)
     left = solved().stats["gradient_solves"] - done
-    assert 0 < left <= again <= left + 1  # what the one before the kill had found may not have been written yet
+    assert 0 < left <= again <= left + TOGETHER  # a batch that was cut short is made again
     assert_same(Front.load(tmp_path / "front.nc"), solved())
 
 
