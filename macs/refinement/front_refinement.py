@@ -126,8 +126,8 @@ class FrontRefinement:
             self._refine(i, task)
 
     def _tasks(self, ends: Mapping[int, LexicographicEnd], between: Sequence[int]) -> Iterator[tuple[int, Scalarised]]:
-        """Rows with their tasks on another mesh: ends first, then the points between, which move along with these: those that gain most, then
-        from the nearest on."""
+        """Rows with their tasks on another mesh: ends first, then the points between, which move along with these: those that gain
+        most, then from the nearest on."""
         yield from ends.items()
         F, m = self.front.F, len(self.units)
         known = [i for i in ends if i in self.found] if len(ends) == m else []
