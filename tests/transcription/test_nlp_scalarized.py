@@ -46,7 +46,7 @@ def close(solved: Solved, F: object, miss: float) -> bool:
 
 
 def solve(nlp: NLP, reference: list[float], weights: list[float], start: np.ndarray | None = None, **more: object) -> Solved:
-    first = nlp.propagate(nlp.first_guess(0.5 * (nlp.lower + nlp.upper)[nlp.free][None]))[0] if start is None else start
+    first = nlp.propagate(nlp.first_guess(0.5 * (nlp.lower[nlp.free] + nlp.upper[nlp.free])[None]))[0] if start is None else start
     return scalarize(nlp, first, reference=np.array(reference), weights=np.array(weights), **more)  # type: ignore[arg-type]
 
 
