@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import lstsq
+from scipy.linalg import cho_factor, cho_solve, lstsq
 from scipy.optimize import nnls
 from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack, identity, vstack
 from scipy.sparse.linalg import SuperLU, splu
@@ -283,14 +283,14 @@ def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) ->
     while True:
         # Of hundreds of limits that a flight is near few are active: others join where they would make the residual smaller.
         rows = full[:, taken].any(axis=1)
-        x[taken] = nnls(full[np.ix_(rows, taken)], right[rows], maxiter=10 * full.shape[1])[0]
+        x[taken] = _not_negative(full[np.ix_(rows, taken)], right[rows])
         left = right - full @ x
         missing = ~taken & (full.T @ left > 1e-3 * np.linalg.norm(left) * lengths)
         if not missing.any() or np.linalg.norm(left) <= 1e-10:
             break
         taken |= missing
-    # nnls solves normal equations, which lose half of the digits. Orthogonal factors lose none, and truncate nothing where slacks are tiny,
-    # as singular values would.
+    # These are solutions of normal equations, which lose half of the digits. Orthogonal factors lose none, and truncate nothing where
+    # slacks are tiny, as singular values would.
     passive = x > 0
     polished, columns = np.zeros_like(x), full[:, passive]
     rows = columns.any(axis=1)
@@ -298,6 +298,29 @@ def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) ->
     candidates = [x, np.maximum(polished, 0.0)]
     found = ((float(np.linalg.norm(M @ c) / c[:m].sum()), c / c[:m].sum()) for c in candidates if c[:m].sum() > 0)
     return min(found, key=lambda one: one[0])
+
+
+def _not_negative(A: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The x >= 0 with the least norm of A x - right, of hundreds of columns by block principal pivoting from all of them, which takes some
+    solves where most are active: Kim and Park, "Fast nonnegative matrix factorization", SIAM J. Sci. Comput. 33(6), 2011. Of few, and where
+    that does not end, by `nnls`: of several solutions, it has one with few numbers that are not 0."""
+    squares, products = A.T @ A, A.T @ right
+    least = 1e-12 * np.linalg.norm(right) * np.sqrt(np.diag(squares))
+    passive, fewest, tries = np.ones(len(products), dtype=bool), len(products) + 1, 3
+    for _ in range(100 if len(products) > 300 else 0):
+        x, own = np.zeros(len(products)), np.flatnonzero(passive)
+        try:
+            x[own] = cho_solve(cho_factor(squares[np.ix_(own, own)], check_finite=False), products[own], check_finite=False)
+        except np.linalg.LinAlgError:
+            break
+        wrong = np.where(passive, x, squares @ x - products + least) < 0.0
+        if not wrong.any():
+            return x
+        tries = 3 if (count := np.count_nonzero(wrong)) < fewest else tries - 1
+        fewest = min(fewest, count)
+        # Where exchanging all of them does not help, one by one does.
+        passive ^= wrong if tries >= 0 else np.arange(len(wrong)) == np.flatnonzero(wrong)[-1]
+    return np.asarray(nnls(A, right, maxiter=10 * A.shape[1])[0])
 
 
 def ratio_bounds(conditions: Conditions, i: int, j: int, residual: float) -> tuple[float, float]:
