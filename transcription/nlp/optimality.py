@@ -316,8 +316,8 @@ def _not_negative(A: np.ndarray, right: np.ndarray) -> np.ndarray:
         wrong = np.where(passive, x, squares @ x - products + least) < 0.0
         if not wrong.any():
             return x
-        tries = 3 if (count := np.count_nonzero(wrong)) < fewest else tries - 1
-        fewest = min(fewest, count)
+        count = int(np.count_nonzero(wrong))
+        fewest, tries = (count, 3) if count < fewest else (fewest, tries - 1)
         # Where exchanging all of them does not help, one by one does.
         passive ^= wrong if tries >= 0 else np.arange(len(wrong)) == np.flatnonzero(wrong)[-1]
     return np.asarray(nnls(A, right, maxiter=10 * A.shape[1])[0])
