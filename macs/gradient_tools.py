@@ -80,7 +80,7 @@ def optimize(
         Decisions to begin with, all variables or the free ones only; the best of them is used.
     starts : int or "auto"
         Number of starts: the first is `start` or the problem's guess, the others are drawn: from everywhere in the bounds, and near the
-        best that is known. The best result is returned. "auto": as many as pay; ten where each finds the same, fewer where a solve
+        best that is known. The best result is returned. "auto": as many as pay; some twenty where each finds the same, fewer where a solve
         takes long, one where a linear objective is at its bound. `stats` of the point has the number of `starts`, how many different
         `optima` they found, and how often that which is returned was `found`; if only once, its `message` says so: there may be better
         ones.

@@ -5,8 +5,7 @@ the best known optimum are often better, so every second start lies near it: mon
 funneling landscapes", J. Global Optimization 18, 2000; for trajectories Englander and Conway, "Automated solution of the low-thrust
 interplanetary trajectory problem", J. Guidance 40(1), 2017. The stopping rule: after k solves with w different optima, the probability that
 the next solve finds a new one is w (w + 1) / (k (k - 1)), with a uniform prior on the number of optima and the sizes of their valleys:
-Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987. Where all
-led to one optimum, ten are enough: the probability is 0.02.
+Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987.
 """
 
 from __future__ import annotations
@@ -41,8 +40,8 @@ class MultistartLimits:
     infeasible: tuple[int, int] = (8, 16)  # fewest and most starts without a feasible vector; between them, what took `WORK.little`
     everywhere: int = 3  # starts from everywhere before only each second one is: the others are near the best that is known
     hopeless: float = 100.0  # scales by which propagated states violate constraints so that the states of the guess are the better start
-    unseen: float = 0.005  # probability that another start would find one more optimum than several below which there are enough
-    fewest: int = 10  # starts that are enough if all that converged led to one optimum, or if none did
+    unseen: float = 0.005  # probability that another start would find another optimum below which there are enough
+    fewest: int = 8  # solves after which none has converged that are enough
     many: int = 60  # where optima are many: solves that are enough, if there are also `last` times as many as it took to find the best
     last: int = 2  # also the multiple of the work for starts where the best of several optima was found once: that is no proof
     most: int = 200
@@ -109,10 +108,10 @@ class Starts:
 class MultistartStopping:
     """Stopping rule of a multistart: the number of optima, how often the best was found, and whether the starts are enough."""
 
-    def __init__(self, alike: int = MULTISTART.fewest) -> None:
+    def __init__(self, unseen: float = MULTISTART.unseen) -> None:
         self._losses: list[float] = []
         self.starts, self.convex = 0, False  # convex: for given times, and these were tried: no start finds another optimum
-        self._last, self._alike = 0, alike  # starts that are enough where all led to one optimum
+        self._last, self._unseen = 0, unseen
 
     def add(self, loss: float | None) -> bool:
         """Count a solve that ended at an optimum with this loss, or at none; returns whether it is the best so far."""
@@ -152,6 +151,13 @@ class MultistartStopping:
         return self.optima() > 1 and not self.convex
 
     @property
+    def complete(self) -> bool:
+        """Whether further starts are not expected to find another optimum."""
+        found, optima = self.converged, self.optima()
+        unseen = self._unseen if optima == 1 else MULTISTART.unseen
+        return found > optima and optima * (optima + 1) <= unseen * found * (found - 1)
+
+    @property
     def enough(self) -> bool:
         """Whether further starts are not expected to find another optimum, or have found nothing better for long."""
         return self.needed <= 0
@@ -159,12 +165,13 @@ class MultistartStopping:
     @property
     def needed(self) -> int:
         """How many starts more there will be at least; 0 or less where there are enough."""
-        found, optima = self.converged, self.optima()
-        if self.convex or not found:
-            return 0 if self.convex and found else MULTISTART.fewest - self.starts
-        many = min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most)
-        expected = self._alike if optima == 1 else int(np.ceil(0.5 + np.sqrt(0.25 + optima * (optima + 1) / MULTISTART.unseen)))
-        return min(many - self.starts, expected - found)
+        if not self.converged:
+            return MULTISTART.fewest - self.starts
+        if self.convex or self.complete:
+            return 0
+        many, optima = min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most), self.optima()
+        pairs = optima * (optima + 1) / (self._unseen if optima == 1 else MULTISTART.unseen)
+        return min(many - self.starts, max(int(np.ceil(0.5 + np.sqrt(0.25 + pairs))) - self.converged, 1))
 
     @property
     def _same(self) -> float:
@@ -185,11 +192,11 @@ class MultistartSolver:
         starts: int | None,
         rng: np.random.Generator,
         solves: GradientSolves,
-        alike: int = MULTISTART.fewest,
+        unseen: float = MULTISTART.unseen,
         most: float = np.inf,
     ) -> None:
         self.nlp, self.starts, self.solves, self.rng = nlp, starts, solves, rng
-        self.stopping, self.most, self._alike = dict[int, MultistartStopping](), most, alike
+        self.stopping, self.most, self._unseen = dict[int, MultistartStopping](), most, unseen
         self.closest: Solved | None = None  # what violates least, where nothing is feasible
         self._timed, self._uneven = False, list[int]()  # whether optima for given times were sought, and whose do not fall with time
         self._starts = Starts(nlp, rng)
@@ -257,7 +264,7 @@ class MultistartSolver:
         if self.closest is not None:
             return self.closest
         if self.starts is None and i not in self.stopping:
-            self.stopping[i] = MultistartStopping(self._alike)
+            self.stopping[i] = MultistartStopping(self._unseen)
             begun, solved = None, self.seek(task, self.stopping[i])
         else:
             begun = self.nearest(task)
