@@ -156,4 +156,8 @@ def test_points_in_different_places(F, width):
     kept, least = separate(F, np.full(F.shape[1], width)), APART * width / len(F)
     apart = np.abs(F[:, None] - F).max(axis=2) > least
     assert (~apart[:, kept]).any(axis=1).all() and (apart | np.eye(len(F), dtype=bool))[np.ix_(kept, kept)].all()
-    assert (F[kept].min(axis=0) == F.min(axis=0)).all() and separate(F[:0], np.ones(F.shape[1])).shape == (0,)
+    assert separate(F[:0], np.ones(F.shape[1])).shape == (0,)
+    # Where the width is many times the range, the best of two objectives may be in one place.
+    ends = np.unique(extremes(F))
+    if (apart | np.eye(len(F), dtype=bool))[np.ix_(ends, ends)].all():
+        assert (F[kept].min(axis=0) == F.min(axis=0)).all()
