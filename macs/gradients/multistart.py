@@ -151,13 +151,6 @@ class MultistartStopping:
         return self.optima() > 1 and not self.convex
 
     @property
-    def complete(self) -> bool:
-        """Whether further starts are not expected to find another optimum."""
-        found, optima = self.converged, self.optima()
-        unseen = self._unseen if optima == 1 else MULTISTART.unseen
-        return found > optima and optima * (optima + 1) <= unseen * found * (found - 1)
-
-    @property
     def enough(self) -> bool:
         """Whether further starts are not expected to find another optimum, or have found nothing better for long."""
         return self.needed <= 0
@@ -167,11 +160,12 @@ class MultistartStopping:
         """How many starts more there will be at least; 0 or less where there are enough."""
         if not self.converged:
             return MULTISTART.fewest - self.starts
-        if self.convex or self.complete:
+        if self.convex:
             return 0
         many, optima = min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most), self.optima()
+        # The least k with optima (optima + 1) <= unseen k (k - 1).
         pairs = optima * (optima + 1) / (self._unseen if optima == 1 else MULTISTART.unseen)
-        return min(many - self.starts, max(int(np.ceil(0.5 + np.sqrt(0.25 + pairs))) - self.converged, 1))
+        return min(many - self.starts, int(np.ceil(0.5 + np.sqrt(0.25 + pairs))) - self.converged)
 
     @property
     def _same(self) -> float:
