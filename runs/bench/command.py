@@ -16,6 +16,7 @@ from macs.io.interrupts import Stopped
 from ..report.page import PageHeader, digest
 from .contest import CONTESTS
 from .contract import Bench, Row, save
+from .corpus import CORPUS, earlier
 from .growth import GENERATION, SCALE
 from .inner import INNER, POPULATION
 from .parts import PARTS_BENCH
@@ -26,6 +27,7 @@ from .study import STUDY
 
 BENCHES: dict[str, Bench] = {
     **CONTESTS,
+    "corpus": CORPUS,
     "front": FRONT,
     "generation": GENERATION,
     "inner": INNER,
@@ -48,13 +50,17 @@ def bench(
     seeds: int | None = None,
     csv: str | None = None,
     page: str | None = None,
+    problems: Sequence[str] = (),
+    against: str | None = None,
     **studies: Any,
 ) -> bool:
     """Run some of `BENCHES`, one after the other; write all numbers to the file `csv`, if there is one.
 
+    Of the corpus, further `problems` by their addresses, and the CSV file of an earlier run whose values stand beside.
     `studies` are the settings `jobs`, `keep` and `solvers` of an `Effort`. The report of a single benchmark is also written to `page`, if
     there is one and it was not interrupted. Returns whether all targets are met.
     """
+    before = earlier(against) if against else {}
     header = header_of(kinds[0], page, quick=quick, seeds=seeds, **studies) if page else None
     measured: list[tuple[str, Row]] = []
     missed: list[str] = []
@@ -63,8 +69,10 @@ def bench(
         effort = one.quick if quick else one.full
         effort = replace(effort, rounds=seeds) if seeds and one.seeded else effort
         effort = replace(effort, **studies) if one.kept else effort
+        effort = replace(effort, cases=(*effort.cases, *problems))
         interrupted = _measure(one, rows, effort)
         measured += [(kind, row) for row in rows]
+        rows = [one for row in rows for one in (row, before.get(row.case)) if one is not None]
         if rows:
             text = one.report(rows)
             print(text, end="\n\n", flush=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,7 +27,7 @@ from .contract import ASKED, Bench, Column, Effort, Row, Target, column
 
 ASKED_ABOUT = tuple(name for name, (address, _) in cases().items() if ".wild:" in address)
 """Problems that others asked about, which are no part of `macs bench standard`."""
-RIGHT, WRONG, UNVERIFIED, FAILED = "right", "WRONG", "not verified", "FAILED"
+RIGHT, WRONG, VERIFIED, UNVERIFIED, FAILED = "right", "WRONG", "verified", "not verified", "FAILED"
 
 
 def lines_of(kind: str, name: str, effort: Effort, steps: Steps) -> tuple[list[dict[str, Any]], str]:
@@ -48,30 +48,44 @@ def default_rounds(name: str, effort: Effort, steps: Steps) -> Callable[[int], I
     """A round solves a problem with all data whose optimum is published."""
 
     def measured(number: int) -> Iterable[Row]:
-        lines, ended = lines_of("defaults", name, effort, steps)
-        for i, record in enumerate(published(name)):
-            given = ", ".join(f"{key}={value:g}" for key, value in record.data.items())
-            line = lines[i] if i < len(lines) else {"status": ended or CRASHED}
-            yield compared(f"{name} ({given})" if given else name, record, line)
+        lines, ended = lines_of("defaults", FOLDER + name, effort, steps)
+        yield from rows_of(name, published(name), lines, ended or CRASHED)
 
     return measured
 
 
-def by_defaults(name: str) -> None:
-    """Print what a user gets without any option, simulated; `seconds` are those from the statement to the solution."""
-    for record in published(name):
-        began = time.perf_counter()
-        problem = load(FOLDER + name, **record.data)
+def rows_of(name: str, records: Sequence[PublishedOptimum | None], lines: Sequence[dict[str, Any]], ended: str) -> Iterator[Row]:
+    """The rows of a problem with all its data, of which each has a line, unless they ended early."""
+    for i, record in enumerate(records):
+        given = ", ".join(f"{key}={value:g}" for key, value in record.data.items()) if record else ""
+        line = lines[i] if i < len(lines) else {"status": ended}
+        yield compared(f"{name} ({given})" if given else name, record, line)
+
+
+def records_of(address: str) -> tuple[PublishedOptimum | None, ...]:
+    """The published optima of a problem, one for each of its data; None for a problem without."""
+    return published(address.removeprefix(FOLDER)) if address.startswith(FOLDER) else (None,)
+
+
+def by_defaults(address: str) -> None:
+    """Print what a user gets without any option, simulated; `seconds` and `cpu` are those from the statement to the solution."""
+    for record in records_of(address):
+        began, worked = time.perf_counter(), time.process_time()
+        problem = load(address, **(record.data if record else {}))
+        if not isinstance(problem, Problem):
+            return
         point = optimize(problem)
-        seconds = time.perf_counter() - began
+        seconds, cpu = time.perf_counter() - began, time.process_time() - worked
         stats, check = point.alone().stats, point.simulate()
+        objective = record.objective if record else next(iter(point.objectives))
         told(
             {
                 "status": point.status,
-                "ours": point.objectives[record.objective],
-                "simulated": check.objectives[record.objective],
+                "ours": point.objectives[objective],
+                "simulated": check.objectives[objective],
                 "violation": check.violation,
                 "seconds": seconds,
+                "cpu": cpu,
                 "starts": stats["gradient_solves"],
                 "iterations": stats["inner_iterations"],
                 "verified": float(bool(point.verified)),
@@ -80,15 +94,18 @@ def by_defaults(name: str) -> None:
         )
 
 
-def compared(case: str, record: PublishedOptimum, line: dict[str, Any]) -> Row:
-    """The row of an optimum; its `who` is the verdict."""
+def compared(case: str, record: PublishedOptimum | None, line: dict[str, Any]) -> Row:
+    """The row of an optimum; its `who` is the verdict: that of a problem without a published optimum is whether it is verified."""
     values = {key: float(value) for key, value in line.items() if key != "status"}
+    if record is not None:
+        values["published"] = record.value
     if line["status"] in (TIMEOUT, CRASHED):
-        return Row.once(case, line["status"], published=record.value, **values)
-    values["error"] = record.error(values["simulated"])
-    right = RIGHT if record.met(values["simulated"]) else WRONG
-    who = FAILED if line["status"] != "converged" else right if values["verified"] else UNVERIFIED
-    return Row.once(case, who, published=record.value, **values)
+        return Row.once(case, line["status"], **values)
+    who = VERIFIED
+    if record is not None:
+        values["error"] = record.error(values["simulated"])
+        who = RIGHT if record.met(values["simulated"]) else WRONG
+    return Row.once(case, FAILED if line["status"] != "converged" else who if values["verified"] else UNVERIFIED, **values)
 
 
 def default_targets(rows: Sequence[Row]) -> list[Target]:

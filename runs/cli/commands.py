@@ -176,6 +176,9 @@ def bench(arguments: Namespace) -> int:
         if given and (quick or not kept):
             those = ", ".join(name for name in BENCHES if BENCHES[name].kept)
             raise WrongCall(f"--{option}: is for searches on plain functions ({those}), without --quick")
+    for option, given in (("against", arguments.against), ("problems", arguments.problems)):
+        if given and kind != "corpus":
+            raise WrongCall(f"--{option}: is for the corpus")
     chosen = tuple(dict.fromkeys(arguments.solvers or ()))
     if chosen:
         if not kind:
@@ -192,9 +195,10 @@ def bench(arguments: Namespace) -> int:
         check_target(arguments.page)
         with wrong_call_on_value_error():
             header_of(kind, arguments.page, **settings)
-    # A folder that contains something else, or that another process has locked.
-    with wrong_call_on_value_error() if arguments.keep else nullcontext():
-        return DONE if measure(kinds, csv=arguments.csv, page=arguments.page, **settings) else FAILED
+    # A folder that contains something else, or that another process has locked; a file of something else.
+    with wrong_call_on_value_error() if arguments.keep or arguments.against else nullcontext():
+        files = {"csv": arguments.csv, "page": arguments.page, "against": arguments.against}
+        return DONE if measure(kinds, problems=arguments.problems, **files, **settings) else FAILED
 
 
 # Studies, and pages for the browser

@@ -14,7 +14,7 @@ import pytest
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems.cases.standard import published
-from runs.bench import BENCHES, growth, header_of, inner, peers, searches, study
+from runs.bench import BENCHES, corpus, growth, header_of, inner, peers, searches, study
 from runs.bench import published as optima
 from runs.bench.contract import Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
 from runs.cli import main
@@ -132,7 +132,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["studies"], ["studies", "study", "constrained, front, generation, inner, many, methods, parts, peers, population"]),
+        (["studies"], ["studies", "study", "constrained, corpus, front, generation, inner, many, methods, parts, peers, population"]),
         (["iner"], ["'iner'", "did you mean inner?"]),
         (["inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
         (["inner", "--seeds", "2"], ["'inner' has none"]),
@@ -293,7 +293,12 @@ def test_published_problems_each_in_its_own_process(capfd):
     (landing,) = measured("standard", "moon_landing")
     assert landing.who == optima.RIGHT and landing.of("published") == 1.420312599049 and abs(landing.of("error")) < 5e-4
     assert landing.of("simulated") == pytest.approx(landing.of("published") * (1 + landing.of("error")), rel=1e-12)
-    assert landing.of("violation") < 1e-6 and landing.of("iterations") >= landing.of("starts") >= 1 and 30 < landing.of("memory") < 1500
+    assert (
+        landing.of("cpu") > 0.0
+        and landing.of("violation") < 1e-6
+        and landing.of("iterations") >= landing.of("starts") >= 1
+        and 30 < landing.of("memory") < 1500
+    )
     (late,) = measured("standard", "moon_landing", seconds=0.05)
     with Steps("published problems", 1) as steps:
         lines, ended = optima.lines_of("defaults", "no_such_problem", Effort(), steps)
@@ -332,6 +337,34 @@ def test_verified_optima_that_differ_are_told():
 def test_verdicts_on_published_optima(change, verdict):
     line = {"status": "converged", "ours": 1.4204, "simulated": 1.4204, "violation": 1e-6, "verified": 1.0, "seconds": 1.0} | change
     assert optima.compared("moon_landing", published("moon_landing")[0], line).who == verdict
+    assert optima.compared("mine", None, line).who == {"right": "verified", "WRONG": "verified"}.get(verdict, verdict)
+
+
+def test_the_corpus_stands_beside_an_earlier_run(monkeypatch, tmp_path, capsys):
+    def told(kind, address, effort, steps):
+        if address == "welded_beam":  # without trajectories
+            return [], ""
+        right = 1.420312599049 if work["right"] else 1.5
+        status = "converged" if "theirs" not in address or work["right"] else "failed"
+        numbers = {"ours": right, "simulated": right, "verified": 1.0, "starts": 2, "iterations": work["iterations"], "cpu": work["cpu"]}
+        return [{"status": status, **numbers}], ""
+
+    monkeypatch.setattr(corpus, "lines_of", told)
+    cases = ("standard/moon_landing", "welded_beam")
+    monkeypatch.setitem(BENCHES, "corpus", replace(corpus.CORPUS, full=Effort(cases)))
+    file, others = str(tmp_path / "first.csv"), ["--problems", "here/mine.py:build", "here/theirs.py:build"]
+    work = {"right": True, "iterations": 40, "cpu": 1.0}
+    assert main(["bench", "corpus", "--csv", file, *others]) == 0
+    first = capsys.readouterr().out
+    assert "solved: 3 of 3" in first and "iterations: geometric mean 40\n" in first and ", before" not in first and "welded" not in first
+    work = {"right": False, "iterations": 10, "cpu": 1.5}
+    assert main(["bench", "corpus", "--against", file, *others]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "solved: 1 of 3" in lines and "iterations: geometric mean 10, 0.250 times those before" in lines
+    assert "solved before only: standard/moon_landing, theirs.py:build" in lines and "another optimum: mine.py:build" in lines
+    assert "slower by a fifth and 0.2 s: mine.py:build" in lines and any("right, before" in line for line in lines)
+    for call, word in ((["corpus", "--against", "nowhere.csv"], "nowhere.csv"), (["zdt", "--problems", "x.py:y"], "--problems")):
+        assert main(["bench", *call]) == 2 and word in capsys.readouterr().err
 
 
 def test_peers_that_are_missing_are_named(monkeypatch):
