@@ -5,7 +5,8 @@ the best known optimum are often better, so every second start lies near it: mon
 funneling landscapes", J. Global Optimization 18, 2000; for trajectories Englander and Conway, "Automated solution of the low-thrust
 interplanetary trajectory problem", J. Guidance 40(1), 2017. The stopping rule: after k solves with w different optima, the probability that
 the next solve finds a new one is w (w + 1) / (k (k - 1)), with a uniform prior on the number of optima and the sizes of their valleys:
-Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987.
+Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987. A new one
+is the best of the w + 1 with probability 1 / (w + 1), if the size of a valley says nothing of its depth; large ones are rather deeper.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from transcription.base import INFEASIBLE, NLP
+from transcription.meshes.errors import objective_variations
 from transcription.nlp.derivatives import convex_objectives, linear_objectives, objective_gradients
 from transcription.nlp.program import nlp_scales
 from transcription.nlp.scalarized import Solved
@@ -40,13 +42,13 @@ class MultistartLimits:
     infeasible: tuple[int, int] = (8, 16)  # fewest and most starts without a feasible vector; between them, what took `WORK.little`
     everywhere: int = 3  # starts from everywhere before only each second one is: the others are near the best that is known
     hopeless: float = 100.0  # scales by which propagated states violate constraints so that the states of the guess are the better start
-    unseen: float = 0.005  # probability that another start would find another optimum below which there are enough
+    better: float = 0.0025  # probability that another start would find a better optimum below which there are enough
     fewest: int = 8  # solves after which none has converged that are enough
     many: int = 60  # where optima are many: solves that are enough, if there are also `last` times as many as it took to find the best
     last: int = 2  # also the multiple of the work for starts where the best of several optima was found once: that is no proof
     most: int = 200
     same: float = 1e-3  # losses that differ by less are of one optimum: as a part of the differences between all optima,
-    rounding: float = 1e-5  # and of their size
+    rounding: float = 1e-5  # and of their size; see also `MultistartStopping.accuracy`
 
 
 MULTISTART = MultistartLimits()
@@ -108,10 +110,10 @@ class Starts:
 class MultistartStopping:
     """Stopping rule of a multistart: the number of optima, how often the best was found, and whether the starts are enough."""
 
-    def __init__(self, unseen: float = MULTISTART.unseen) -> None:
+    def __init__(self, better: float = MULTISTART.better) -> None:
         self._losses: list[float] = []
         self.starts, self.convex = 0, False  # convex: for given times, and these were tried: no start finds another optimum
-        self._last, self._unseen = 0, unseen
+        self._last, self._better, self.accuracy = 0, better, 0.0  # accuracy of losses, whatever their size: near zero that says nothing
 
     def add(self, loss: float | None) -> bool:
         """Count a solve that ended at an optimum with this loss, or at none; returns whether it is the best so far."""
@@ -163,8 +165,8 @@ class MultistartStopping:
         if self.convex:
             return 0
         many, optima = min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most), self.optima()
-        # The least k with optima (optima + 1) <= unseen k (k - 1).
-        pairs = optima * (optima + 1) / (self._unseen if optima == 1 else MULTISTART.unseen)
+        # The least k with optima <= better k (k - 1).
+        pairs = optima / (self._better if optima == 1 else MULTISTART.better)
         return min(many - self.starts, int(np.ceil(0.5 + np.sqrt(0.25 + pairs))) - self.converged)
 
     @property
@@ -172,7 +174,7 @@ class MultistartStopping:
         losses = np.array(self._losses)
         if not len(losses):
             return 0.0
-        return max(MULTISTART.same * float(np.ptp(losses)), MULTISTART.rounding * float(np.abs(losses).max()))
+        return max(MULTISTART.same * float(np.ptp(losses)), MULTISTART.rounding * float(np.abs(losses).max()), self.accuracy)
 
 
 class MultistartSolver:
@@ -186,11 +188,11 @@ class MultistartSolver:
         starts: int | None,
         rng: np.random.Generator,
         solves: GradientSolves,
-        unseen: float = MULTISTART.unseen,
+        better: float = MULTISTART.better,
         most: float = np.inf,
     ) -> None:
         self.nlp, self.starts, self.solves, self.rng = nlp, starts, solves, rng
-        self.stopping, self.most, self._unseen = dict[int, MultistartStopping](), most, unseen
+        self.stopping, self.most, self._better = dict[int, MultistartStopping](), most, better
         self.closest: Solved | None = None  # what violates least, where nothing is feasible
         self._timed, self._uneven = False, list[int]()  # whether optima for given times were sought, and whose do not fall with time
         self._starts = Starts(nlp, rng)
@@ -258,7 +260,7 @@ class MultistartSolver:
         if self.closest is not None:
             return self.closest
         if self.starts is None and i not in self.stopping:
-            self.stopping[i] = MultistartStopping(self._unseen)
+            self.stopping[i] = MultistartStopping(self._better)
             begun, solved = None, self.seek(task, self.stopping[i])
         else:
             begun = self.nearest(task)
@@ -299,6 +301,9 @@ class MultistartSolver:
                 if left <= 0.0:
                     break
                 converged = stopping_rule.converged
+                if converged and not stopping_rule.accuracy:
+                    variations = objective_variations(self.nlp, best.z)[task.moving] / task.weights[task.moving]
+                    stopping_rule.accuracy = MULTISTART.clearly * float(variations.max())
                 # Where none has converged yet, they may all take long.
                 with self.solves.at_most(MULTISTART.iterations if converged else self.solves.max_iterations):
                     if sides:

@@ -37,7 +37,7 @@ class GradientRules:
     """How many gradient solves a search makes, and from where (measured on the catalogue's problems)."""
 
     first_points: int = 10  # most points of the front that are found before the search begins
-    unseen: float = 0.1  # probability of another optimum below which there are starts enough to begin with, if all led to one
+    better: float = 0.05  # probability of a better optimum below which there are starts enough to begin with, if all led to one
     evaluations_per_start: int = 20  # at the beginning, one start may be drawn for so many evaluations
     flat: float = 0.05  # least component of a direction in the weights: a smaller one would leave its objective without control
     least_polish: int = 60  # solves that a polish may always make if proposals are mostly propagated: solves then find the points
@@ -106,7 +106,7 @@ class Opening:
             return None
         count = None if self._evaluator.ways else 1
         solves, most = _counted_by(self._evaluator), self._budget // GRADIENT_RULES.evaluations_per_start
-        return MultistartSolver(self._evaluator.nlp, start, count, self._rng, solves, GRADIENT_RULES.unseen, most)
+        return MultistartSolver(self._evaluator.nlp, start, count, self._rng, solves, GRADIENT_RULES.better, most)
 
     def _decided(self, solver: MultistartSolver | None) -> bool:
         """Whether a gradient solve for the first objective ends at an optimum, or solves for feasibility find that there is none."""
