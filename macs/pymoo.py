@@ -31,7 +31,7 @@ from pymoo.util.display.single import SingleObjectiveOutput
 from problems.checks import unknown
 from problems.vector import CompiledVectorProblem
 
-from .evaluation.blackbox import BlackBox, plain_problem
+from .evaluation.blackbox import BlackBox, plain_problem, pymoo_numbers, pymoo_rows
 from .evaluation.evaluator import FAILED, Evaluation
 from .search.macs import MACS as Search  # noqa: N811 - a class
 from .search.rounds import PLANNED_EVALUATIONS, Rounds
@@ -50,7 +50,8 @@ OPTIONS = tuple(name for name, one in inspect.signature(Algorithm).parameters.it
 
 
 class MACS(Algorithm):
-    """Multi-Agent Collaborative Search as an algorithm of pymoo, for any pymoo Problem of real variables.
+    """Multi-Agent Collaborative Search as an algorithm of pymoo, for any pymoo Problem: of real variables, whole numbers,
+    choices, and all of these.
 
     It is the search of `macs.MACS`: on a problem without constraints, the same settings, seed and number of evaluations give the points of
     `macs.MACS(...).minimize(problem, evaluations=..., seed=...)`, to the last bit; with G, too.
@@ -89,7 +90,7 @@ class MACS(Algorithm):
     Raises
     ------
     ValueError
-        If a setting is outside its range. By `setup`, and so by `minimize`: if the problem has variables that are not real, no finite
+        If a setting is outside its range. By `setup`, and so by `minimize`: if the problem has variables of unknown classes, no finite
         bounds, or more objectives than the archive may have points.
     TypeError
         If there is no such setting.
@@ -158,6 +159,7 @@ class MACS(Algorithm):
         self._planned = False  # whether settings follow from the budget
         self._given = Population.empty()  # first points
         self._known: dict[bytes, Any] = {}  # individuals of the archive and the agents
+        self._designs: dict[bytes, np.ndarray] = {}  # what is known of those that are not evaluated again
         self._idle = 0
 
     def next(self) -> None:
@@ -218,9 +220,10 @@ class MACS(Algorithm):
 
     def _individuals(self, X: np.ndarray) -> Population:
         """Individuals at X (k, d); in the first population those that were given."""
-        batch = Population.new(X=X) if len(X) else Population.empty()
+        own = pymoo_rows(self.problem, self._compiled.variables, X)
+        batch = Population.new(X=own) if len(X) else Population.empty()
         for i, one in enumerate(self._given[: len(X)]):
-            if np.array_equal(one.X, X[i]):
+            if np.array_equal(one.X, own[i]):
                 batch[i] = one
         return batch
 
@@ -230,8 +233,9 @@ class MACS(Algorithm):
             self._plan()
         assert self._budget is not None
         state, evaluator = copy.deepcopy(self._state), Told(self._compiled, self._told, more, self._known)
+        evaluator.known_designs = dict(self._designs)
         if state is None:
-            start = decisions(self._given.get("X"), self._compiled.variables) if len(self._given) else None
+            start = decisions(self._numbers(self._given), self._compiled.variables) if len(self._given) else None
             return self.search.begin(evaluator, self._budget, copy.deepcopy(self.random_state), start), evaluator
         evaluator.counts.evaluations = state.evaluations
         state.rounds = None if self._planned else state.rounds or Rounds.first(self.problem.n_obj, False, PLANNED_EVALUATIONS)
@@ -256,12 +260,16 @@ class MACS(Algorithm):
         """The points that are given, or those that pymoo's Sampling draws, inside the bounds."""
         given = Initialization(self.sampling).do(self.problem, count, random_state=self.random_state, algorithm=self)
         try:
-            X = decisions(given.get("X"), self._compiled.variables)
+            X = decisions(self._numbers(given), self._compiled.variables)
         except ValueError as error:
             raise ValueError(f"sampling: {str(error).removeprefix('start: ')}") from None
-        inside = (given.get("X") == X).all(axis=1)  # others are outside by rounding
-        moved = Population.new(X=X)
+        inside = (self._numbers(given) == X).all(axis=1)  # others are outside by rounding
+        moved = Population.new(X=pymoo_rows(self.problem, self._compiled.variables, X))
         return Population.create(*(one if same else other for one, other, same in zip(given, moved, inside, strict=True)))
+
+    def _numbers(self, batch: Population) -> np.ndarray:
+        """Variables (k, d) of individuals as numbers."""
+        return pymoo_numbers(self.problem, self._compiled.variables, batch.get("X"))
 
     def _complete(self, state: SearchState, evaluator: Told) -> None:
         """Go on to the next iteration, with the population of this one."""
@@ -270,6 +278,9 @@ class MACS(Algorithm):
             self.termination.terminate()
         self.off = Population.create(*(one for batch in self._told for one in batch))
         self._state, self._told, self._asked, self._budget = state, [], None, None
+        self._designs = evaluator.known_designs
+        if evaluator.exhausted:
+            self.termination.terminate()
         self._given = Population.empty()
         kept = [place(*row) for group in (state.archive, state.agents) for row in zip(group.Z, group.F, strict=True)]
         self._known = {key: evaluator.known[key] for key in kept}
@@ -319,7 +330,8 @@ class Told(BlackBox):
 
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         evaluation, iterations = super()._evaluate(Z, way)
-        evaluation = replace(evaluation, Z=np.array(self._batch.get("X"), dtype=float))
+        if self.kinds[0] is None:
+            evaluation = replace(evaluation, Z=np.array(self._batch.get("X"), dtype=float))
         for one, z, f, status in zip(self._batch, evaluation.Z, evaluation.F, evaluation.status, strict=True):
             if status == FAILED:
                 one.CV = np.array([np.inf])  # what is not a number is feasible for pymoo if there are no constraints

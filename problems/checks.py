@@ -71,6 +71,29 @@ def interval(value: Any, what: str) -> tuple[float, float]:
     return lower, upper if apart(lower, upper) else lower
 
 
+def whole(value: Any, what: str) -> tuple[float, float]:
+    """The bounds of a whole number, which are whole themselves."""
+    limits = interval(value, f"the bounds of {what}")
+    if any(side != round(side) or abs(side) > 2**53 for side in limits):
+        raise ValueError(f"the bounds of {what}, a whole number, must be whole numbers, not ({limits[0]:g}, {limits[1]:g})")
+    return limits
+
+
+def choices(values: Any, what: str) -> tuple[Any, ...]:
+    """Two or more different texts, numbers or truth values, of one kind."""
+    if isinstance(values, str) or not isinstance(values, Iterable) or len(labels := tuple(values)) < 2:
+        raise ValueError(f"the choices of {what} must be two or more, not {shown(values)}")
+    labels = tuple(one.item() if isinstance(one, np.generic) else one for one in labels)
+    for label in labels:
+        if isinstance(label, str):
+            check_text(label, f"a choice of {what}")
+        elif not isinstance(label, bool | int | float) or not math.isfinite(label):
+            raise ValueError(f"a choice of {what} must be a text, a number or a truth value, not {shown(label)}")
+    if len({str(label) for label in labels}) < len(labels):
+        raise ValueError(f"two choices of {what} are the same: {', '.join(map(str, labels))}")
+    return labels
+
+
 def apart(lower: float, upper: float) -> bool:
     """Whether two ends of an interval are far enough apart to be told from each other.
 

@@ -6,8 +6,9 @@ Everything above this floor reads a problem through these classes. They pickle, 
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from graphlib import TopologicalSorter
 from heapq import heappop, heappush
@@ -63,7 +64,7 @@ class Variable:
     """A state, control, parameter or time: its bounds, and how it is shown and scaled.
 
     `scale` is in the variable's unit; it defaults to the span of the bounds. `period` is None unless the variable is an angle-like
-    quantity of which `bounds` are exactly one period.
+    quantity of which `bounds` are exactly one period. One of several `choices` has the number of its choice as its value, from 0.
 
     Parameters
     ----------
@@ -72,6 +73,10 @@ class Variable:
     unit : str
     scale : float
     period : float, optional
+    integer : bool
+        Whether its values are whole numbers.
+    choices : tuple
+        What the whole numbers from 0 stand for; empty if they are numbers.
 
     Examples
     --------
@@ -87,9 +92,18 @@ class Variable:
     unit: str = ""
     scale: float = 1.0
     period: float | None = None
+    # Not in the repr, of which fingerprints are made; see `kinds`.
+    integer: bool = field(default=False, repr=False)
+    choices: tuple[Any, ...] = field(default=(), repr=False)
 
     def __hash__(self) -> int:
         return hash(self.name)
+
+    def meant(self, value: float) -> Any:
+        """What a value stands for: a float, an int, or one of the choices."""
+        if not self.integer or not math.isfinite(value):
+            return float(value)
+        return self.choices[round(value)] if self.choices else round(value)
 
     @property
     def span(self) -> float:
@@ -97,7 +111,12 @@ class Variable:
 
     def named(self, name: str) -> Variable:
         """The same under another name."""
-        return Variable(name, self.lower, self.upper, self.unit, self.scale, self.period)
+        return replace(self, name=name)
+
+
+def kinds(variables: Sequence[Variable]) -> list[tuple[str, tuple[Any, ...]]]:
+    """Names and choices of the variables that are not real; nothing if all are."""
+    return [(v.name, v.choices) for v in variables if v.integer]
 
 
 @dataclass(frozen=True)
@@ -333,7 +352,7 @@ class CompiledProblem(Deriving):
         a table changes once its derivatives are asked for.
         """
         digest = hashlib.sha256()
-        digest.update(repr((self.name, self.parameters, self.goals, self.limits, self.links)).encode())
+        digest.update(repr((self.name, self.parameters, self.goals, self.limits, self.links, *kinds(self.parameters))).encode())
         for phase in self.phases:
             digest.update(repr((phase.name, phase.time_unit, phase.t0, phase.tf, phase.duration, phase.states, phase.controls)).encode())
             digest.update(repr((phase.initial, phase.final, phase.paths)).encode())

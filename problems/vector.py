@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -17,7 +17,7 @@ from typing import Any, NoReturn, TypeVar
 import numpy as np
 
 from . import checks
-from .compiled import Limit, Objective, Variable
+from .compiled import Limit, Objective, Variable, kinds
 
 
 def without_dynamics(name: str) -> str:
@@ -123,7 +123,8 @@ class CompiledVectorProblem:
     def sample(self) -> np.ndarray:
         """The `SAMPLED` rows (n, d), drawn from the box and always the same, by which the function is known."""
         lower, upper = (np.array([getattr(v, side) for v in self.variables]) for side in ("lower", "upper"))
-        return np.random.default_rng(0).uniform(lower, upper, (SAMPLED, len(lower)))
+        X, whole = np.random.default_rng(0).uniform(lower, upper, (SAMPLED, len(lower))), [v.integer for v in self.variables]
+        return np.where(whole, X.round(), X)
 
     @cached_property
     def _sampled(self) -> tuple[np.ndarray, np.ndarray]:
@@ -142,7 +143,8 @@ class CompiledVectorProblem:
         """A hash of names, bounds, senses, limits, and of the function's values at fixed rows, to nine digits: two problems with the same
         one are the same. The function is evaluated at the `sample` for it, once."""
         values = np.hstack(self._sampled)
-        told = ("vector", self.name, self.variables, self.goals, self.limits, *([self.equalities] if self.equalities else []))
+        own = [self.equalities] if self.equalities else []
+        told = ("vector", self.name, self.variables, self.goals, self.limits, *own, *kinds(self.variables))
         digest = hashlib.sha256(repr(told).encode())
         digest.update(" ".join(f"{value + 0.0:.8e}" if math.isfinite(value) else "not finite" for value in values.ravel()).encode())
         return digest.hexdigest()[:32]
@@ -210,16 +212,42 @@ class VectorProblem:
         """Limits by name."""
         return MappingProxyType(self._constraints)
 
-    def variable(self, name: str, *, bounds: Any, unit: str = "", period: float | None = None) -> None:
-        """Add a decision variable within finite bounds; with a `period`, bounds are one period wide, and values wrap around."""
+    def variable(
+        self,
+        name: str,
+        *,
+        bounds: Any = None,
+        unit: str = "",
+        period: float | None = None,
+        integer: bool = False,
+        choices: Sequence[Any] | None = None,
+    ) -> None:
+        """Add a decision variable within finite bounds; with a `period`, bounds are one period wide, and values wrap around.
+
+        `integer`: a whole number within the bounds, which belong to it. `choices`, in place of bounds: one of two or more different texts,
+        numbers or truth values, without an order. The function of rows as an array has whole numbers as floats there, and the number of the
+        choice, from 0; that of one row as a dict has an int, and the choice itself.
+        """
         what = checks.new_name("variable", name, self._variables, f"problem '{self.name}'")
-        lower, upper = checks.interval(bounds, f"the bounds of {what}")
+        if choices is not None:
+            if bounds is not None or period is not None or integer:
+                raise ValueError(f"{what} has choices, and so neither bounds nor a period")
+            labels = checks.choices(choices, what)
+            self._variables[name] = Variable(
+                name, 0.0, len(labels) - 1.0, checks.unit(unit, what), len(labels) - 1.0, integer=True, choices=labels
+            )
+            return
+        if bounds is None:
+            raise ValueError(f"{what} has neither bounds nor choices")
+        lower, upper = checks.whole(bounds, what) if integer else checks.interval(bounds, f"the bounds of {what}")
+        if integer and period is not None:
+            raise ValueError(f"{what} is a whole number, and so has no period")
         if lower == upper:
             raise ValueError(f"the bounds of {what} leave nothing to decide: {lower:g} on both sides")
         if not math.isfinite(upper - lower):
             raise ValueError(f"the bounds of {what}, ({lower:g}, {upper:g}), are too far apart")
         length = checks.period(period, (lower, upper), what)
-        self._variables[name] = Variable(name, lower, upper, checks.unit(unit, what), upper - lower, length)
+        self._variables[name] = Variable(name, lower, upper, checks.unit(unit, what), upper - lower, length, integer)
 
     def minimize(self, name: str, *, unit: str = "", scale: float | None = None) -> None:
         """Add an objective to be minimised; `scale` is the difference in it that counts as one where objectives are compared, by default

@@ -141,7 +141,7 @@ class PopulationSolver(Solver):
 
     def _draw(self, evaluator: Evaluator, count: int, rng: np.random.Generator) -> np.ndarray:
         """Candidates (count, d) drawn uniformly from the box, as pymoo does."""
-        return evaluator.lower + (evaluator.upper - evaluator.lower) * rng.random((count, len(evaluator.free)))
+        return evaluator.lower + (evaluator.upper - evaluator.lower) * evaluator.box.evenly(rng.random((count, len(evaluator.free))))
 
     def _candidates(self, evaluator: Evaluator, given: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
         """First full vectors (count, D): the given ones, then drawn ones."""

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..evaluation.evaluator import Evaluator
+from ..evaluation.evaluator import Evaluator, UnitBox
 from ..pareto.directions import check_several
 from .population import Members, PopulationSolver, State, distinct, evaluate, full_vectors, thinned
 
@@ -159,11 +159,13 @@ class Baseline(PopulationSolver):
             if asked is None:  # no new offspring could be made
                 break
             alone = not hasattr(asked, "__len__")
-            offspring = [asked] if alone else asked[:left]
-            if len(offspring) == left:
-                self._cut(algorithm, left)
-            X = np.array([one.X for one in offspring])
-            bred = evaluate(evaluator, full_vectors(evaluator, state.members, X), self.degree)
+            offspring = [asked] if alone else asked
+            X = settled(evaluator.box, np.array([one.X for one in offspring]), state.rng)
+            Z = full_vectors(evaluator, state.members, X)
+            room = evaluator.room(Z, left)
+            if room < len(offspring):
+                self._cut(algorithm, room)
+            bred, offspring = evaluate(evaluator, Z[:room], self.degree), offspring[:room]
             left = budget - evaluator.counts.evaluations
             self._present(offspring, bred, len(table), evaluator)
             table = table.joined(bred)
@@ -181,6 +183,7 @@ class Baseline(PopulationSolver):
         from pymoo.config import Config
         from pymoo.core.evaluator import VoidEvaluator
         from pymoo.core.problem import Problem
+        from pymoo.core.repair import Repair
         from pymoo.termination.max_gen import MaximumGenerationTermination
 
         Config.warnings["not_compiled"] = False  # it would print
@@ -194,6 +197,13 @@ class Baseline(PopulationSolver):
         problem = Problem(n_var=d, n_obj=m, n_ieq_constr=constraints, xl=evaluator.lower, xu=evaluator.upper)
         algorithm.setup(problem, termination=end, evaluator=VoidEvaluator(value=None), seed=0)
         algorithm.random_state = rng
+        if evaluator.box.whole is not None and hasattr(algorithm, "mating"):
+
+            class Settled(Repair):
+                def _do(self, problem: Any, X: np.ndarray, **more: Any) -> np.ndarray:
+                    return settled(evaluator.box, X, rng)
+
+            algorithm.mating.repair = Settled()  # before duplicates are left out
         return algorithm
 
     def _individuals(self, points: Members, evaluator: Evaluator) -> Any:
@@ -217,6 +227,11 @@ class Baseline(PopulationSolver):
         state.members = table.take(rows_of(algorithm.pop))
         self._keep(algorithm, state, table)
         state.show(evaluator.tolerance, seen, table.take(rows_of(self._best(algorithm))), state.members)
+
+
+def settled(box: UnitBox, X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Candidates X (k, d) with whole numbers where they are meant, see `UnitBox.settle`; others are unchanged to the last bit."""
+    return X if box.whole is None else np.where(box.whole, box.to_values(box.settle(box.to_unit(X), rng)), X)
 
 
 def _table(state: State) -> Members:

@@ -163,7 +163,8 @@ class MOPSO(PopulationSolver):
         V = velocities(box, X, state.velocity, best, leaders, weights=weights, chance=chance, largest=self.max_velocity)
         X, V = moved(box, X, V, rebound)
 
-        seen = evaluate(evaluator, full_vectors(evaluator, state.members, box.to_values(X))[:left], self.degree)
+        Z = full_vectors(evaluator, state.members, box.to_values(box.settle(X, rng)))
+        seen = evaluate(evaluator, Z[: evaluator.room(Z, left)], self.degree)
         n = len(seen)
         state.members = seen.joined(state.members.take(np.arange(n, swarm)))
         state.velocity = np.concatenate([V[:n], state.velocity[n:]])

@@ -6,12 +6,12 @@ import logging
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from problems.checks import check_text, interval, shown
+from problems.checks import check_text, choices, interval, shown, unknown, whole
 from problems.compiled import Objective, Variable
 from problems.vector import SAMPLED, CompiledVectorProblem, real_numbers
 from transcription.stopping import Stopped
@@ -42,6 +42,8 @@ class BlackBox(Evaluator):
         self.lower, self.upper = (np.array([getattr(v, side) for v in problem.variables]) for side in ("lower", "upper"))
         self.period = np.array([v.period or 0.0 for v in problem.variables])
         self.free = np.arange(len(problem.variables))
+        self.set_kinds(problem.variables)
+        self.known_designs: dict[bytes, np.ndarray] = {}
         self.counts = Counts(evaluations=SAMPLED if self._equalities else 0)
 
     @property
@@ -62,10 +64,28 @@ class BlackBox(Evaluator):
         """See `Evaluator.goals`."""
         return self.problem.goals or default_goals(self.m)
 
-    def resume(self, counts: Counts, m: int) -> None:
+    def resume(self, counts: Counts, m: int, memory: np.ndarray) -> None:
         """See `Evaluator.resume`. Raises ValueError if the function has another number of objectives."""
-        super().resume(counts, m)
+        super().resume(counts, m, memory)
         self.m_known = learned(self.m_known, m, f"the checkpoint has {m}")
+        d = len(self.free)
+        if memory.dtype != float or (len(memory) and memory.shape[1:2] < (d + m + 1,)):
+            raise ValueError("the checkpoint has known designs of another problem")
+        self.known_designs = {row[:d].tobytes(): row for row in memory}
+
+    @property
+    def memory(self) -> np.ndarray:
+        """See `Evaluator.memory`: variables, objectives, violation and residuals."""
+        return np.array([*self.known_designs.values()]) if self.known_designs else np.empty((0, 0))
+
+    @property
+    def exhausted(self) -> bool:
+        """See `Evaluator.exhausted`."""
+        return len(self.known_designs) >= self.box.designs
+
+    def knows(self, Z: np.ndarray) -> np.ndarray:
+        """See `Evaluator.knows`."""
+        return np.array([row.tobytes() in self.known_designs for row in Z], dtype=bool)
 
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         """The candidates (k, d) themselves: all variables of a black box are free."""
@@ -79,6 +99,35 @@ class BlackBox(Evaluator):
         except KeyboardInterrupt:
             raise Stopped("interrupted") from None
 
+    def room(self, Z: np.ndarray, left: int) -> int:
+        """See `Evaluator.room`."""
+        if np.isinf(self.box.designs):
+            return super().room(Z, left)
+        new = set[bytes]()
+        for i, row in enumerate(Z):
+            new |= {row.tobytes()} - self.known_designs.keys()
+            if len(new) > left:
+                return i
+        return len(Z)
+
+    def evaluate(self, Z: np.ndarray, way: int | None = None) -> Evaluation:
+        """See `Evaluator.evaluate`. Where all variables are whole numbers, no design is evaluated, or counted, twice."""
+        if np.isinf(self.box.designs):
+            return super().evaluate(Z, way)
+        keys = [row.tobytes() for row in Z]
+        new = [*{key: i for i, key in reversed([*enumerate(keys)]) if key not in self.known_designs}.values()][::-1]
+        if new:
+            one = super().evaluate(Z[new], way)
+            assert one.residuals is not None
+            for i, *row in zip(new, one.F, one.violation[:, None], one.residuals, strict=True):
+                self.known_designs[keys[i]] = np.concatenate([Z[i], *row])
+        rows, d, m = np.array([self.known_designs[key] for key in keys]), len(self.free), self.m
+        F, violation, residuals = rows[:, d : d + m], rows[:, d + m], rows[:, d + m + 1 :]
+        return Evaluation(Z.copy(), F, violation, self._status(violation), residuals=residuals)
+
+    def _status(self, violation: np.ndarray) -> np.ndarray:
+        return np.where(np.isinf(violation), FAILED, np.where(violation <= self.tolerance, CONVERGED, INFEASIBLE))
+
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         F, residuals = self._values(Z)
         self.m_known = learned(self.m_known, F.shape[1], f"function returned {F.shape[1]}")
@@ -87,8 +136,7 @@ class BlackBox(Evaluator):
         violation = np.abs(residuals).max(axis=1, initial=0.0)
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))
         F[failed], violation[failed] = np.nan, np.inf
-        status = np.where(failed, FAILED, np.where(violation <= self.tolerance, CONVERGED, INFEASIBLE))
-        return Evaluation(Z=Z.copy(), F=F, violation=violation, status=status, residuals=residuals), 0
+        return Evaluation(Z=Z.copy(), F=F, violation=violation, status=self._status(violation), residuals=residuals), 0
 
 
 @contextmanager
@@ -126,6 +174,7 @@ def plain_problem(
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
     senses: Sequence[str] | None = None,
+    integer: bool | Sequence[str] = False,
     name: str = "",
 ) -> CompiledVectorProblem:
     """The vector problem of a plain vector function or a pymoo Problem; see `Solver.minimize` for the arguments and what is refused.
@@ -136,11 +185,12 @@ def plain_problem(
     m: int | None = None
     equalities: tuple[int, ...] = ()
     if is_pymoo(function):
-        _check_real(function)
         equalities = tuple(range(int(function.n_ieq_constr), int(function.n_ieq_constr + function.n_eq_constr)))
-        bounds = _pymoo_bounds(function) if bounds is None else bounds
         m = int(function.n_obj)
-        function = PymooFunction(function)
+        variables = _pymoo_variables(function, bounds)
+        function = PymooFunction(function, variables)
+    else:
+        variables = read_bounds(bounds)
     if not callable(function):
         raise ValueError(f"function: must be callable or a pymoo Problem, not {type(function).__name__}")
     if constraints is not None and not callable(constraints):
@@ -157,7 +207,7 @@ def plain_problem(
             m = learned(m, len(words), f"{key} has {len(words)}")
     return CompiledVectorProblem(
         name=name,
-        variables=read_bounds(bounds),
+        variables=_whole(variables, integer),
         goals=() if m is None else default_goals(m, labels["names"], labels["units"], labels["senses"]),
         limits=None,
         rows=PlainRows(function, constraints),
@@ -253,27 +303,49 @@ def is_pymoo(problem: Any) -> bool:
     return all(hasattr(problem, name) for name in ("n_var", "n_obj", "xl", "xu", "evaluate"))
 
 
-def _check_real(problem: Any) -> None:
-    """Raise ValueError if not all variables of a pymoo Problem are real: a search would propose fractions of whole numbers and choices."""
-    named, kind = getattr(problem, "vars", None), getattr(problem, "vtype", None)
-    if named is not None:
-        variables = named.values() if isinstance(named, Mapping) else named
-        found = f"variables by name ({', '.join(sorted({type(one).__name__ for one in variables}))})"
-    elif kind is None or (isinstance(kind, type) and (issubclass(kind, float | np.floating) or kind.__name__ == "Real")):
-        return
-    else:
-        found = f"variables of type {getattr(kind, '__name__', kind)}"
-    what = f"pymoo problem {type(problem).__name__} has {found}"
-    raise ValueError(f"function: {what}; searches propose real numbers only, in arrays (vtype=float, xl, xu), no whole numbers or choices")
+def _whole(variables: tuple[Variable, ...], integer: bool | Sequence[str]) -> tuple[Variable, ...]:
+    """The variables, of which all, or those of some names, are whole numbers."""
+    named = [v.name for v in variables] if integer is True else [integer] if isinstance(integer, str) else list(integer or ())
+    for name in named:
+        if name not in [v.name for v in variables]:
+            raise ValueError(f"integer: {unknown('variable', name, (v.name for v in variables))}")
+    for v in variables:
+        if v.name in named:
+            whole((v.lower, v.upper), f"variable '{v.name}'")
+    return tuple(replace(v, integer=v.integer or v.name in named) for v in variables)
 
 
-def _pymoo_bounds(problem: Any) -> list[tuple[float, float]]:
-    """Pairs of bounds of a pymoo Problem with real variables."""
-    lower, upper = problem.xl, problem.xu
-    if lower is None or upper is None or isinstance(lower, dict):
-        raise ValueError(f"bounds: pymoo problem {type(problem).__name__} has no bounds of real variables")
-    lower, upper = np.broadcast_to(lower, problem.n_var), np.broadcast_to(upper, problem.n_var)
-    return list(zip(lower.tolist(), upper.tolist(), strict=True))
+def _pymoo_variables(problem: Any, bounds: Any) -> tuple[Variable, ...]:
+    """The variables of a pymoo Problem: of `vars` with their names, else of `xl`, `xu` and `vtype`, or with other bounds."""
+    own, kind, what = getattr(problem, "vars", None), getattr(problem, "vtype", None), f"pymoo problem {type(problem).__name__}"
+    if own:
+        return tuple(_pymoo_variable(str(name), one, what) for name, one in own.items())
+    if bounds is None:
+        lower, upper = (0, 1) if kind is bool and problem.xl is None else (problem.xl, problem.xu)
+        if lower is None or upper is None:
+            raise ValueError(f"bounds: {what} has no bounds of its variables")
+        sides = (np.broadcast_to(side, problem.n_var).tolist() for side in (lower, upper))
+        bounds = list(zip(*sides, strict=True))
+    if kind is not None and not (isinstance(kind, type) and (issubclass(kind, float | int | np.number) or kind.__name__ in _PYMOO)):
+        raise ValueError(f"function: {what} has variables of type {getattr(kind, '__name__', kind)}, which are neither numbers nor choices")
+    real = kind is None or issubclass(kind, float | np.floating) or kind.__name__ == "Real"
+    return _whole(read_bounds(bounds), not real)
+
+
+_PYMOO = ("Real", "Integer", "Binary", "Choice")
+"""Classes of pymoo's variables."""
+
+
+def _pymoo_variable(name: str, one: Any, what: str) -> Variable:
+    kind = next((word for word in _PYMOO if word in [each.__name__ for each in type(one).__mro__]), "")
+    if kind == "Choice":
+        labels = [str(option) for option in one.options]
+        labels = labels if len(set(labels)) == len(labels) else [f"{label} ({i})" for i, label in enumerate(labels)]
+        return Variable(name, 0.0, len(labels) - 1.0, "", len(labels) - 1.0, integer=True, choices=choices(labels, f"variable '{name}'"))
+    if not kind:
+        raise ValueError(f"function: {what} has a variable '{name}' of the class {type(one).__name__}, one of {', '.join(_PYMOO)} expected")
+    bounds = (0, 1) if kind == "Binary" else one.bounds
+    return _whole(read_bounds({name: bounds}), kind != "Real")[0]
 
 
 @dataclass(frozen=True)
@@ -281,11 +353,40 @@ class PymooFunction:
     """A pymoo Problem, vectorised or elementwise, as function that returns (F, G); the last columns of G are its equality constraints."""
 
     problem: Any
+    variables: tuple[Variable, ...]
 
     def __call__(self, X: np.ndarray) -> Outputs:
-        out = self.problem.evaluate(X, return_values_of=["F", "G", "H"], return_as_dictionary=True)
+        given = pymoo_rows(self.problem, self.variables, X)
+        out = self.problem.evaluate(given, return_values_of=["F", "G", "H"], return_as_dictionary=True)
         columns = [out[key] for key in ("G", "H") if out.get(key) is not None and np.size(out[key])]
         return (out["F"], np.hstack(columns)) if columns else out["F"]
+
+
+def pymoo_rows(problem: Any, variables: Sequence[Variable], X: np.ndarray) -> np.ndarray:
+    """Rows X (k, d) as a pymoo Problem wants them: dicts by name where it has `vars`, whole numbers where its `vtype` is that."""
+    own = getattr(problem, "vars", None)
+    if not own:
+        whole = [v.integer for v in variables]
+        return X if not all(whole) else X.astype(bool if problem.vtype is bool else int)
+    rows = np.empty(len(X), dtype=object)
+    for i, row in enumerate(X.tolist()):
+        rows[i] = {name: _pymoo_value(one, v, value) for (name, one), v, value in zip(own.items(), variables, row, strict=True)}
+    return rows
+
+
+def pymoo_numbers(problem: Any, variables: Sequence[Variable], rows: Any) -> np.ndarray:
+    """Rows as a pymoo Problem wants them as numbers (k, d)."""
+    own = getattr(problem, "vars", None)
+    if not own:
+        return np.array(rows, dtype=float)
+    pairs = [*zip(own.items(), variables, strict=True)]
+    return np.array([[[*one.options].index(row[name]) if v.choices else row[name] for (name, one), v in pairs] for row in rows], dtype=float)
+
+
+def _pymoo_value(one: Any, variable: Variable, value: float) -> Any:
+    if variable.choices:
+        return one.options[round(value)]
+    return bool(value) if getattr(type(one), "vtype", None) is bool else variable.meant(value)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from problems.checks import short_repr
-from problems.compiled import Objective
+from problems.compiled import Objective, Variable
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 from ..io.text import counted
@@ -36,6 +36,13 @@ class UnitBox:
     upper: np.ndarray
     # (d,): True for a periodic variable: its bounds are one period wide, and a point that leaves through one re-enters through the other.
     wraps: np.ndarray
+    whole: np.ndarray | None = None  # (d,): True for whole numbers, and for numbers of choices; None: all are real
+    unordered: np.ndarray | None = None  # (d,): True for those of choices
+
+    @property
+    def designs(self) -> float:
+        """Number of different points; infinite unless all variables are whole numbers."""
+        return float(np.prod(self.span + 1.0)) if self.whole is not None and self.whole.all() else np.inf
 
     @property
     def span(self) -> np.ndarray:
@@ -48,12 +55,37 @@ class UnitBox:
 
     def to_values(self, X: np.ndarray) -> np.ndarray:
         """Values (..., d) in the user's units, inside the bounds to the last bit."""
-        return np.clip(self.lower + X * self.span, self.lower, self.upper)
+        return self.rounded(np.clip(self.lower + X * self.span, self.lower, self.upper))
+
+    def rounded(self, values: np.ndarray) -> np.ndarray:
+        """The values (..., d) with whole numbers where they are meant."""
+        return values if self.whole is None else np.where(self.whole, values.round(), values)
 
     def confine(self, values: np.ndarray) -> np.ndarray:
         """The values (..., d), in the user's units, with those outside the bounds put back; the others are unchanged to the last bit."""
         outside = (values < self.lower) | (values > self.upper)
-        return np.where(outside, self.to_values(self.to_unit(values)), values)
+        return self.rounded(np.where(outside, self.to_values(self.to_unit(values)), values))
+
+    def settle(self, X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """The points X (k, d) with whole numbers where they are meant, drawn from the two beside each, the nearer the likelier, so that
+        short steps lead somewhere. A choice has no neighbours: between two, it is drawn from all."""
+        if self.whole is None:
+            return X
+        place = np.where(self.whole, X * self.span, 0.0)
+        near = np.abs(place - place.round()) < 1e-6  # exact but for rounding
+        drawn = np.where(near, place.round(), np.floor(place) + (rng.random(X.shape) < place - np.floor(place)))
+        free = np.floor(rng.random(X.shape) * (self.span + 1.0))
+        moved = self.unordered & (np.abs(place - place.round()) > 0.05)
+        return np.where(self.whole, np.where(moved, free, drawn) / self.span, X)
+
+    def neighbour(self, x: np.ndarray, reach: int, rng: np.random.Generator) -> np.ndarray:
+        """A point near x (d,) that differs in one or a few whole numbers, each by at most `reach`, or in choices."""
+        assert self.whole is not None and self.unordered is not None
+        moving = self.whole & (rng.random(len(x)) < 1.0 / np.count_nonzero(self.whole))
+        moving[rng.choice(np.flatnonzero(self.whole))] = True
+        step = rng.integers(1, reach + 1, len(x)) * rng.choice([-1.0, 1.0], len(x))
+        place = np.where(self.unordered, np.floor(rng.random(len(x)) * (self.span + 1.0)), np.clip(x * self.span + step, 0.0, self.span))
+        return np.where(moving, place / self.span, x)
 
     def put_back(self, X: np.ndarray) -> np.ndarray:
         """The points X (..., d), wrapped where periodic and clipped elsewhere."""
@@ -91,7 +123,11 @@ class UnitBox:
     def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Latin hypercube of `count` points, (count, d) (McKay, Beckman and Conover 1979)."""
         strata = rng.permuted(np.tile(np.arange(count), (len(self.lower), 1)), axis=1).T
-        return (strata + rng.random(strata.shape)) / count
+        return self.evenly((strata + rng.random(strata.shape)) / count)
+
+    def evenly(self, X: np.ndarray) -> np.ndarray:
+        """Points X (k, d) of [0, 1) with whole numbers where they are meant, all of them equally likely."""
+        return X if self.whole is None else np.where(self.whole, np.floor(X * (self.span + 1.0)) / self.span, X)
 
 
 @dataclass(frozen=True, repr=False)
@@ -215,6 +251,8 @@ class Evaluator(ABC):
         Finite bounds of the free variables, in the user's units; `lower < upper`.
     period : array (d,)
         Period of a periodic free variable, whose bounds are one period wide; 0 for other variables.
+    kinds : pair of arrays (d,) of bool
+        Which free variables are whole numbers, and which of these are numbers of choices; None and None if all are real.
     tolerance : float
         A point whose violation is at most this is feasible.
     has_gradients : bool
@@ -242,6 +280,7 @@ class Evaluator(ABC):
     lower: np.ndarray
     upper: np.ndarray
     period: np.ndarray
+    kinds: tuple[np.ndarray, np.ndarray] | tuple[None, None] = (None, None)
     tolerance: float
     has_gradients: bool = False
     moves: bool = False
@@ -253,7 +292,30 @@ class Evaluator(ABC):
     @property
     def box(self) -> UnitBox:
         """Box of the free variables."""
-        return UnitBox(self.lower, self.upper, self.period > 0.0)
+        return UnitBox(self.lower, self.upper, self.period > 0.0, *self.kinds)
+
+    def set_kinds(self, variables: Sequence[Variable]) -> None:
+        """Set `kinds` by the free variables."""
+        whole = np.array([v.integer for v in variables], dtype=bool)
+        self.kinds = (whole, np.array([bool(v.choices) for v in variables])) if whole.any() else (None, None)
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether there is no other point to evaluate."""
+        return False
+
+    def knows(self, Z: np.ndarray) -> np.ndarray:
+        """Which full vectors (k, D) were evaluated already, and are not evaluated again: (k,)."""
+        return np.zeros(len(Z), dtype=bool)
+
+    def room(self, Z: np.ndarray, left: int) -> int:
+        """How many of the first full vectors (k, D) take no more than `left` evaluations."""
+        return min(left, len(Z))
+
+    @property
+    def memory(self) -> np.ndarray:
+        """What is known of evaluated points that are not evaluated again, a row for each: for `resume`."""
+        return np.empty((0, 0))
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -265,8 +327,8 @@ class Evaluator(ABC):
         """The m objectives, in the user's units and senses; needed by searches with a preference only."""
         raise NotImplementedError(f"{type(self).__name__} does not name its objectives")
 
-    def resume(self, counts: Counts, m: int) -> None:
-        """Continue with the counts of an earlier run with m objectives."""
+    def resume(self, counts: Counts, m: int, memory: np.ndarray) -> None:
+        """Continue with the counts and the memory of an earlier run with m objectives."""
         self.counts = counts
 
     def check_budget(self, budget: int) -> None:

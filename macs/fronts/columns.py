@@ -6,13 +6,15 @@ import json
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from problems.compiled import Limit, Variable
+from problems.compiled import Limit, Variable, kinds
 
 from ..io.netcdf import COUNT, NUMBER, TEXT, FileArray, Group, Labelled, words
+from ..io.text import document
 
 KINDS = {NUMBER: "numbers", COUNT: "whole numbers", TEXT: "texts"}
 
@@ -65,14 +67,24 @@ def variable_table(dimension: str, what: str, limits: bool = False) -> dict[str,
     }
     if not limits:
         table[f"{dimension}_period"] = FileArray(along, NUMBER, f"period of the {what}, NaN if it is not periodic", units)
+        table[f"{dimension}_integer"] = FileArray(along, COUNT, f"1 if the {what} is a whole number, else 0", optional=True)
+        choices = f"what the whole numbers from 0 of the {what} stand for, a JSON list; empty if they are numbers"
+        table[f"{dimension}_choices"] = FileArray(along, TEXT, choices, optional=True)
     return table
 
 
 def variable_columns(variables: Sequence[Variable | Limit], dimension: str, limits: bool = False) -> dict[str, np.ndarray]:
-    """Variables or limits as the arrays of `variable_table`."""
+    """Variables or limits as the arrays of `variable_table`; of whole numbers only where there are any."""
+    plain = limits or not kinds(variables)  # type: ignore[arg-type]
+
+    def entry(v: Variable | Limit, word: str) -> Any:
+        value = getattr(v, word or "name")
+        return (document(value) if value else "") if word == "choices" else value
+
     return {
-        array: column.of([getattr(v, array.removeprefix(dimension).lstrip("_") or "name") for v in variables])
+        array: column.of([entry(v, array.removeprefix(dimension).lstrip("_")) for v in variables])
         for array, column in variable_table(dimension, "", limits).items()
+        if not (plain and column.optional and not limits)
     }
 
 
@@ -81,7 +93,15 @@ def read_variables(data: Labelled, dimension: str) -> tuple[Variable, ...]:
     rows = zip(read_limits(data, dimension), data[f"{dimension}_period"].tolist(), strict=True)
     if not np.all(np.isnan(data[f"{dimension}_period"]) | (data[f"{dimension}_period"] > 0)):
         raise ValueError(f"'{dimension}_period' has a period that is not above 0")
-    return tuple(Variable(v.name, v.lower, v.upper, v.unit, v.scale, None if np.isnan(period) else period) for v, period in rows)
+    found = [Variable(v.name, v.lower, v.upper, v.unit, v.scale, None if np.isnan(period) else period) for v, period in rows]
+    if f"{dimension}_integer" in data.arrays:
+        whole = data[f"{dimension}_integer"].tolist()
+        texts = data[f"{dimension}_choices"] if f"{dimension}_choices" in data.arrays else [""] * len(whole)
+        labels = read_documents((text or "[]" for text in texts), f"{dimension}_choices", lambda value: isinstance(value, list))
+        found = [replace(v, integer=bool(one), choices=tuple(some)) for v, one, some in zip(found, whole, labels, strict=True)]
+        if wrong := [v.name for v in found if v.choices and v.upper - v.lower != len(v.choices) - 1]:
+            raise ValueError(f"the {dimension} '{wrong[0]}' has another number of choices than bounds")
+    return tuple(found)
 
 
 def read_limits(data: Labelled, dimension: str) -> tuple[Limit, ...]:

@@ -345,7 +345,10 @@ def costates_of_point(weights: np.ndarray, phases: Mapping[str, PhaseCostates | 
 
 def root_dataset(front: Points) -> Labelled:
     """Everything of a front but its trajectories."""
-    parameters = [point.parameters for point in front]
+    parameters = [
+        dict(zip((v.name for v in point.variables), point.decision.tolist(), strict=True)) if not front.dynamic else point.parameters
+        for point in front
+    ]
     names = list(dict.fromkeys(name for row in parameters for name in row))
     units = {variable.name: variable.unit for variable in front.variables}
     values = [[row.get(name, np.nan) for name in names] for row in parameters]

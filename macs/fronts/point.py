@@ -156,10 +156,10 @@ class Point:
         return self._points.source
 
     @property
-    def parameters(self) -> dict[str, float]:
-        """Static decision variables by name; for a black box or a vector problem, all its variables."""
+    def parameters(self) -> dict[str, Any]:
+        """Static decision variables by name; for a black box or a vector problem, all its variables: floats, ints, or what was chosen."""
         if not self._points.dynamic:
-            return dict(zip((v.name for v in self.variables), self.decision.tolist(), strict=True))
+            return {v.name: v.meant(value) for v, value in zip(self.variables, self.decision.tolist(), strict=True)}
         return {} if self.trajectory is None else dict(self.trajectory.parameters)
 
     @property

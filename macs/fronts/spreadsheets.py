@@ -40,7 +40,7 @@ def save_csv(front: Any, path: str | PathLike[str]) -> None:
 def _chosen_columns(front: Any) -> dict[str, list[Any]]:
     """Parameters, and when each phase begins and ends; of points without trajectories all their variables."""
     if not front.dynamic:
-        return {label(v.name, v.unit): front.decision[:, k].tolist() for k, v in enumerate(front.variables)}
+        return {label(v.name, v.unit): [v.meant(value) for value in front.decision[:, k]] for k, v in enumerate(front.variables)}
     units = {variable.name: variable.unit for variable in front.variables}
     flights = front.trajectories
     known = next((flight for flight in flights if flight is not None), None)

@@ -75,7 +75,8 @@ def _table(front: Points, columns: Mapping[str, Sequence[Any]]) -> _Table:
     table.append((("violation", ""), _small(front.violation), False))
     if vector and len(front.variables) <= 6:
         for variable, values in zip(front.variables, front.decision.T, strict=True):
-            table.append(((variable.name, f"[{variable.unit or '-'}]"), numbers(values), False))
+            meant = [str(variable.meant(value)) for value in values] if variable.integer else numbers(values)
+            table.append(((variable.name, f"[{variable.unit or '-'}]"), meant, bool(variable.choices)))
     if was.any():
         off, how = missed(front) * front.within[:, None], "again" if vector else "simulated"
         table += [] if vector else [(("defect", how), _small(front.defect), False)]

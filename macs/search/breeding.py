@@ -115,6 +115,22 @@ def breed(
     return box.put_back(mutate(children, rng, how.mutation)), differs
 
 
+def try_neighbours(trials: Trials) -> None:
+    """Evaluate designs that differ from points of the archive, or from the least violated ones, in a few whole numbers or choices: at most
+    four for each agent. Most are those that the difference of two points leads to."""
+    state, box = trials.state, trials.box
+    if box.whole is None or box.unordered is None or not len(state.parents):
+        return
+    rows = np.concatenate([state.rng.permutation(len(state.parents)) for _ in range(3)])[: 4 * trials.settings.agents]
+    points = box.to_unit(state.parents.Z[rows][:, trials.evaluator.free])
+    first, second, _ = mates(box, points, box.to_unit(state.parents.Z[:, trials.evaluator.free]), state.rng, 0.0)
+    along = np.where(box.unordered, first, points + first - second) if len(state.parents) > FEW_MATES else points
+    near = np.array([box.neighbour(one, 1, state.rng) for one in points])
+    trial = np.where(box.whole & (state.rng.random((len(points), 1)) < 0.7), box.put_back(along), near)
+    trials.evaluate(state.parents.Z[rows], points, trial)
+    update_archives(state, trials.seen, trials.settings, trials.evaluator)
+
+
 def breed_archive(trials: Trials) -> None:
     """Breed offspring of the archive's points, or of the least violated points as long as nothing is feasible, from as many parents as
     possible; and one of each infeasible point with better objectives than the archive."""

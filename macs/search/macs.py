@@ -29,7 +29,7 @@ from ..pareto.spread import Guide, spread
 from ..refinement.mending import mended
 from ..refinement.mesh_search import SearchMeshes
 from ..solvers.solver import Solver
-from .breeding import breed_archive
+from .breeding import breed_archive, try_neighbours
 from .gradient_actions import Opening, begin_round, gradient_actions, polish_archive
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
@@ -153,7 +153,9 @@ class MACS(Settings, Solver):
             seen += trials.seen
         offspring = Trials(self, state, evaluator, budget)
         breed_archive(offspring)
-        repair(Trials(self, state, evaluator, budget), [*seen, *offspring.seen])
+        neighbours = Trials(self, state, evaluator, budget)
+        try_neighbours(neighbours)
+        repair(Trials(self, state, evaluator, budget), [*seen, *offspring.seen, *neighbours.seen])
         guide = guide_of(self.prefer, evaluator)
         gradient_actions(state, self, evaluator, guide)
         assign(state, self, guide)

@@ -129,8 +129,10 @@ class Trials:
 
     def evaluate(self, Z: np.ndarray, X: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, Evaluation | None]:
         """Evaluate those proposals (k, d) that differ from X (k, d), the unit coordinates of the full vectors Z (k, D) they come from,
-        within the budget; no agent moves. Returns their rows (j,), and the results."""
-        moved = np.flatnonzero((trial != X).any(axis=1))[: max(self.budget - self.state.evaluations, 0)]
+        within the budget; no agent moves. Returns their rows (j,), and the results. Changes proposals: to whole numbers where they are
+        meant, and where a design is known to one nearby that is not."""
+        new = self._settle(trial) & (trial != X).any(axis=1)
+        moved = np.flatnonzero(new)[: max(self.budget - self.state.evaluations, 0)]
         if not moved.size:
             return moved, None
         X, trial, free = X[moved], trial[moved], self.evaluator.free
@@ -140,6 +142,30 @@ class Trials:
         self.state.evaluations = self.evaluator.counts.evaluations
         self.seen.append(result)
         return moved, result
+
+    def _settle(self, trial: np.ndarray) -> np.ndarray:
+        """Which of the proposals (k, d), changed in place, are to be evaluated, as far as that depends on whole numbers."""
+        box, rng, tried = self.box, self.state.rng, set[bytes]()
+        trial[:] = box.settle(trial, rng)
+        new = np.ones(len(trial), dtype=bool)
+
+        def fresh(points: np.ndarray) -> np.ndarray:
+            values = box.to_values(points)
+            return ~self.evaluator.knows(values) & [row.tobytes() not in tried for row in values]
+
+        for i in range(0 if np.isinf(box.designs) else len(trial)):
+            first, reach = trial[i].copy(), 1
+            while not fresh(trial[i : i + 1])[0] and reach < 2 * box.span.max():
+                near = np.array([box.neighbour(first, reach, rng) for _ in range(3 * len(first))])
+                trial[i], reach = near[np.argmax(fresh(near))], 2 * reach
+            new[i] = fresh(trial[i : i + 1])[0]
+            if not new[i] and box.designs <= 10_000:  # all around are known: any other
+                left = np.indices(tuple((box.span + 1.0).astype(int).tolist())).reshape(len(first), -1).T / box.span
+                left = left[fresh(left)]
+                new[i] = len(left) > 0
+                trial[i] = rng.choice(left) if new[i] else first
+            tried.add(box.to_values(trial[i]).tobytes())
+        return new
 
     def _evaluated(self, Z: np.ndarray) -> Evaluation:
         """The evaluation of full vectors (k, D), each by the presently best inner solver. As long as nothing is feasible, and without

@@ -16,7 +16,7 @@ import stat
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -58,6 +58,7 @@ class RunStatus:
     idle: int  # number of iterations since the last evaluation
     elapsed: float  # seconds of work so far
     stopped: str = ""  # why the run ended by itself; empty as long as it has not
+    memory: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))  # see `Evaluator.memory`
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ class _Document:
     elapsed: float
     stopped: str
     state: bytes
+    memory: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
 
 class Unreadable(ValueError):  # noqa: N818 - the state of the file
@@ -118,7 +120,7 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
         try:
             found = decode(content, _Document)
             theirs = _read_json(found.belongs)
-            status = RunStatus(theirs.get("seed"), found.counts, found.idle, found.elapsed, found.stopped)
+            status = RunStatus(theirs.get("seed"), found.counts, found.idle, found.elapsed, found.stopped, found.memory)
             _check_counts(status)
         except (TypeError, AttributeError, ValueError, RecursionError) as error:
             raise ValueError(f"is no valid checkpoint: {error}") from error
@@ -143,7 +145,8 @@ class Checkpoint(AbstractContextManager["Checkpoint"]):
             self._checked = True
         self._check(state)
         belongs = json.dumps(self._belongs | {"seed": status.seed})
-        self._waiting = _Document(belongs, self._versions, status.counts, status.idle, status.elapsed, status.stopped, content)
+        told = status.counts, status.idle, status.elapsed, status.stopped
+        self._waiting = _Document(belongs, self._versions, *told, content, status.memory)
         self._waiting = decode(encode(self._waiting), _Document)  # a copy: the counts go on
 
     def _check(self, state: Any) -> None:

@@ -50,7 +50,7 @@ class SearchRun:
         self._state: Any = found[0] if found else None
         self._seed, self._idle = status.seed, status.idle
         if self._state is not None:
-            self.evaluator.resume(status.counts, self._state.archive.F.shape[1])
+            self.evaluator.resume(status.counts, self._state.archive.F.shape[1], status.memory)
         self._uncut = status.counts.clocked
         self._called_off = ""
         with (
@@ -102,6 +102,8 @@ class SearchRun:
         """Why the run has ended, after its last round; empty if another follows."""
         if self.call.evaluations is not None and self.evaluator.counts.evaluations >= self.call.evaluations:
             return "budget"
+        if self.evaluator.exhausted:
+            return "done"
         return self.solver.ended(self._state) or ("idle" if self._idle >= IDLE_ITERATIONS else "")
 
     def _search_round(self) -> None:
@@ -109,7 +111,7 @@ class SearchRun:
         self.evaluator.before_batch = self._show_and_check
         counts = self.evaluator.counts
         limit = self.solver.round_end(self._state) if self.call.evaluations is None else self.call.evaluations
-        while counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not self.solver.ended(self._state):
+        while counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not (self.evaluator.exhausted or self.solver.ended(self._state)):
             spent = counts.evaluations
             self.solver.advance(self._state, self.evaluator, limit)
             self._idle = self._idle + 1 if counts.evaluations == spent else 0
@@ -139,7 +141,8 @@ class SearchRun:
         counts = self.evaluator.counts
         self._uncut = counts.clocked
         if self._checkpoint:
-            self._checkpoint.keep(self._state, RunStatus(self._seed, counts, self._idle, self._interrupts.elapsed, stopped))
+            told = self._idle, self._interrupts.elapsed, stopped, self.evaluator.memory
+            self._checkpoint.keep(self._state, RunStatus(self._seed, counts, *told))
 
     def _cut_short(self) -> bool:
         """Whether a time limit, Ctrl-C or the callback has cut work short since the state was last kept."""

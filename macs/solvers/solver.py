@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from problems.checks import unknown
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledProblem, kinds
 from problems.problem import Problem
 from problems.vector import CompiledVectorProblem, VectorProblem, without_dynamics
 from transcription.base import Transcription, check_freedom, check_problem
@@ -253,6 +253,7 @@ class Solver(SearchMethod):
         names: Sequence[str] | None = None,
         units: Sequence[str] | None = None,
         senses: Sequence[str] | None = None,
+        integer: bool | Sequence[str] = False,
         tolerance: float = 1e-6,
         start: Any = None,
         time_limit: float | None = None,
@@ -277,6 +278,9 @@ class Solver(SearchMethod):
             What an equality of a pymoo Problem may miss, as a part of its typical size in the box; 8 evaluations find that out.
         names, units, senses : sequences of str, optional
             Names, units and senses ("minimize" or "maximize") of the objectives. Default: "f1", "f2", ..., no units, all minimised.
+        integer : bool or sequence of str
+            Whether all variables, or those of these names, are whole numbers. A pymoo Problem says so itself, by its `vtype` or `vars`;
+            choices have the places of its options as their values. For choices of your own state a `VectorProblem`.
         seed, start, time_limit, progress, callback, checkpoint
             As for `solve`. A checkpoint knows only bounds and names of a function, so the caller must pass the same function again.
 
@@ -292,11 +296,12 @@ class Solver(SearchMethod):
             If the checkpoint cannot be written; before any work.
         """
         call = Call(self._budget(None, evaluations), seed, tolerance, time_limit, None, progress, callback, checkpoint)
-        problem = plain_problem(function, bounds, constraints=constraints, names=names, units=units, senses=senses)
+        problem = plain_problem(function, bounds, constraints=constraints, names=names, units=units, senses=senses, integer=integer)
         what = {
             "bounds": {v.name: (v.lower, v.upper) for v in problem.variables},
             "objectives": {"number": len(problem.goals) or None, "names": names, "units": units, "senses": senses},
             "constraints": constraints is not None,
+            **({"kinds": kinds(problem.variables)} if kinds(problem.variables) else {}),
         }
         return self._search_vector(problem, start, call, what)
 

@@ -409,7 +409,8 @@ def describe(front: Front, point: Point) -> str:
         f"point {point.index} of {len(front)}, {point.status}": objectives,
         _verdict(front, point): _simulated(front, point),
         "parameters" if front.dynamic else "variables": {
-            label(name, units.get(name, "")): f"{value:.10g}" for name, value in point.parameters.items()
+            label(name, units.get(name, "")): f"{value:.10g}" if isinstance(value, float) else str(value)
+            for name, value in point.parameters.items()
         },
         f"violation, {point.violation:.1e} at most": {name: f"{value:.1e}" for name, value in point.violations.items()},
         "leaves bounds between nodes, by this much of the scale": excursions,

@@ -256,7 +256,9 @@ def draw_designs(front: Any, title: str, figure: Any = None, marked: Sequence[in
                 ax.scatter(J[i, 0], values[i], s=70, facecolors="none", edgecolors=COLORS[1], linewidths=1.4, zorder=4)
             draw_limits(ax, values, [(None, variable.lower, variable.upper)], 0.6, margin=0.08)
             ax.set_ylabel(wrapped(axis_label(variable.name, variable.unit), 1.5))
-            note_above(ax, interval(variable.lower, variable.upper))
+            note_above(ax, "" if variable.choices else interval(variable.lower, variable.upper))
+            if variable.choices:
+                ax.set_yticks(range(len(variable.choices)), [str(label) for label in variable.choices])
         if len(goals) > 1 and good.any():
             figure.colorbar(shades, ax=list(axes), label=axis_label(goals[1].name, goals[1].unit)).outline.set_visible(False)
         handles, words = axes[0].get_legend_handles_labels()
