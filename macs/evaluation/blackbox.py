@@ -380,7 +380,8 @@ def pymoo_numbers(problem: Any, variables: Sequence[Variable], rows: Any) -> np.
     if not own:
         return np.array(rows, dtype=float)
     pairs = [*zip(own.items(), variables, strict=True)]
-    return np.array([[[*one.options].index(row[name]) if v.choices else row[name] for (name, one), v in pairs] for row in rows], dtype=float)
+    numbers = [[[*one.options].index(row[name]) if v.choices else row[name] for (name, one), v in pairs] for row in rows]
+    return np.array(numbers, dtype=float)
 
 
 def _pymoo_value(one: Any, variable: Variable, value: float) -> Any:

@@ -111,7 +111,9 @@ class SearchRun:
         self.evaluator.before_batch = self._show_and_check
         counts = self.evaluator.counts
         limit = self.solver.round_end(self._state) if self.call.evaluations is None else self.call.evaluations
-        while counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not (self.evaluator.exhausted or self.solver.ended(self._state)):
+        while (
+            counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not (self.evaluator.exhausted or self.solver.ended(self._state))
+        ):
             spent = counts.evaluations
             self.solver.advance(self._state, self.evaluator, limit)
             self._idle = self._idle + 1 if counts.evaluations == spent else 0

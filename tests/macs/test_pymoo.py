@@ -14,7 +14,7 @@ from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.core.problem import ElementwiseProblem, Problem
 from pymoo.core.termination import NoTermination, TerminateIfAll
-from pymoo.core.variable import Binary, Real
+from pymoo.core.variable import Binary, Choice, Integer, Real, Variable
 from pymoo.operators.sampling.lhs import LHS
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
@@ -398,15 +398,15 @@ def test_what_is_feasible_is_in_the_individuals_config(monkeypatch):
     assert 1e-3 < np.abs(res.H).max() <= 0.05 and (res.CV == 0).all()
 
 
-def test_only_real_variables_with_bounds_settings_of_the_algorithm_and_constraints_that_stay():
-    class Mixed(ElementwiseProblem):
+def test_only_known_variables_with_bounds_settings_of_the_algorithm_and_constraints_that_stay():
+    class Odd(ElementwiseProblem):
         def __init__(self) -> None:
-            super().__init__(vars={"a": Real(bounds=(0, 1)), "b": Binary()}, n_obj=1)
+            super().__init__(vars={"a": Real(bounds=(0, 1)), "b": Variable()}, n_obj=1)
 
     for problem, message in (
-        (Mixed(), r"problem Mixed has variables by name \(Binary, Real\)"),
-        (Problem(n_var=2, n_obj=2, xl=0, xu=1, vtype=bool), "problem Problem has variables of type bool"),
-        (Problem(n_var=2, n_obj=2, xl=0, xu=9, vtype=int), "has variables of type int"),
+        (Odd(), "pymoo problem Odd has a variable 'b' of the class Variable"),
+        (Problem(n_var=2, n_obj=2, xl=0, xu=1, vtype=str), "problem Problem has variables of type str"),
+        (Problem(n_var=2, n_obj=2, xl=0, xu=9.5, vtype=int), "variable 'x1', a whole number, must be whole numbers"),
         (Problem(n_var=2, n_obj=2), "no bounds"),
         (Problem(n_var=2, n_obj=2, xl=np.zeros(2), xu=np.array([1.0, np.inf])), "variable 'x2'"),
     ):
@@ -419,6 +419,34 @@ def test_only_real_variables_with_bounds_settings_of_the_algorithm_and_constrain
             minimize(get_problem("zdt1"), MACS(), ("n_eval", 10), **{name: value})
     with pytest.raises(ValueError, match="may not change"):
         minimize(get_problem("bnh"), AdaptiveEpsilonConstraintHandling(MACS()), ("n_eval", 10))
+
+
+def test_whole_numbers_and_choices_are_searched_as_they_are_and_as_by_macs():
+    class Mixed(ElementwiseProblem):
+        def __init__(self) -> None:
+            kinds = {"n": Integer(bounds=(1, 40)), "m": Choice(options=["al", "st"]), "x": Real(bounds=(0, 1)), "b": Binary()}
+            super().__init__(vars=kinds, n_obj=2)
+
+        def _evaluate(self, x, out, *args, **kwargs):
+            assert isinstance(x["n"], int) and isinstance(x["b"], bool)
+            cost = {"al": 1.0, "st": 2.0}[x["m"]]
+            out["F"] = [x["n"] * cost + x["x"], 10 / cost / x["n"] + (x["x"] - 0.5) ** 2 + x["b"]]
+
+    found = minimize(Mixed(), MACS(), ("n_eval", 300), seed=1)
+    ours = macs.MACS(archive=100).minimize(Mixed(), evaluations=300, seed=1)
+    assert np.array_equal(np.sort(found.F[:, 0]), np.sort(ours.F[:, 0]))
+    assert ours[0].parameters["m"] == "al" and ours[0].parameters["n"] == 1 and found.X[0].keys() == ours[0].parameters.keys()
+
+    class Whole(Problem):
+        def __init__(self) -> None:
+            super().__init__(n_var=2, n_obj=2, xl=0, xu=6, vtype=int)
+
+        def _evaluate(self, X, out, *args, **kwargs):
+            assert X.dtype == int
+            out["F"] = np.column_stack([(X**2).sum(axis=1), ((X - 5) ** 2).sum(axis=1)])
+
+    result = minimize(Whole(), MACS(), ("n_eval", 200), seed=1)
+    assert result.algorithm.evaluator.n_eval == 49 and result.X.dtype == int and (np.abs(result.X[:, 0] - result.X[:, 1]) <= 1).all()
 
 
 def test_settings_are_refused_as_those_of_macs():
