@@ -7,6 +7,7 @@ interplanetary trajectory problem", J. Guidance 40(1), 2017. The stopping rule: 
 the next solve finds a new one is w (w + 1) / (k (k - 1)), with a uniform prior on the number of optima and the sizes of their valleys:
 Boender and Rinnooy Kan, "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987. A new one
 is the best of the w + 1 with probability 1 / (w + 1), if the size of a valley says nothing of its depth; large ones are rather deeper.
+Where one start alone found the best, they are not: the probability is 1 / 2 then.
 """
 
 from __future__ import annotations
@@ -165,8 +166,10 @@ class MultistartStopping:
         if self.convex:
             return 0
         many, optima = min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most), self.optima()
-        # The least k with optima <= better k (k - 1).
-        pairs = optima / (self._better if optima == 1 else MULTISTART.better)
+        # The least k with optima <= better k (k - 1). Where one start alone found the best, small valleys may be deep: a new one is better
+        # with probability 1 / 2 then.
+        weight = optima * ((optima + 1) / 2 if self.found_once else 1)
+        pairs = weight / (self._better if optima == 1 else MULTISTART.better)
         return min(many - self.starts, int(np.ceil(0.5 + np.sqrt(0.25 + pairs))) - self.converged)
 
     @property
