@@ -119,8 +119,7 @@ def from_vectors(nlp: NLP, Z: np.ndarray, solver: Mapping[str, Any], stats: Mapp
 
     Objectives and violations are evaluated by the NLP, and so is the status, unless it is given.
     """
-    # The variables are recorded even without points.
-    given = trajectory_columns(nlp, Z, stats["tolerance"]) | {"variables": nlp.variables} | more
+    given = trajectory_columns(nlp, Z, stats["tolerance"]) | more
     return Points(**given, goals=nlp.problem.goals, problem=nlp.problem, solver=solver, stats=stats)
 
 
@@ -147,7 +146,7 @@ def conflict(nlp: NLP, nearest: Point) -> str:
 
 
 def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, Any]:
-    """Columns of `Points`, of k entries each, for vectors (k, n) of one NLP."""
+    """Columns of `Points`, of k entries each, for vectors (k, n) of one NLP; their variables are there even without any."""
     k = len(Z)
     F, violation = nlp.evaluate(Z) if k else (np.empty((0, len(nlp.problem.goals))), np.empty(0))
     trajectories = [nlp.unpack(z) for z in Z]
@@ -156,7 +155,7 @@ def trajectory_columns(nlp: NLP, Z: np.ndarray, tolerance: float) -> dict[str, A
         "decision": Z,
         "violation": violation,
         "status": _status(violation, tolerance),
-        "variables": [nlp.variables] * k,
+        "variables": nlp.variables,
         "violations": [nlp.violations(z) for z in Z],
         "trajectories": trajectories,
         "excursions": [excursions(nlp.problem, trajectory) for trajectory in trajectories],

@@ -5,7 +5,7 @@ The ends of the front are solved first, each for the least value of its own obje
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +22,7 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED
-from ..fronts.builders import certified, from_vectors
+from ..fronts.builders import certified, trajectory_columns
 from ..fronts.point import Point
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
@@ -30,8 +30,9 @@ from ..fronts.verified import fixed_scales
 from ..gradients.ends import moved_along
 from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised
 from ..io.console import working
+from ..io.text import counted
 from ..pareto.dominance import extremes
-from .mesh_loop import MeshLoop, OnMesh, Programs, Refinement, differentiable
+from .mesh_loop import MeshLoop, OnMesh, Programs, differentiable
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class FrontLimits:
     of_end: float = 6.0  # what an end may take of the work that is allowed, in equal shares of it
     of_one: float = 2.0  # the same for any other point
     neighbours: int = 2  # points whose trajectories are further starts of one
+    together: int = 4  # points that are refined before others begin on their meshes
 
 
 FRONT = FrontLimits()
@@ -72,6 +74,62 @@ def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float |
         job.go(show)
         elapsed, stopped = interrupts.elapsed, interrupts.reason
     return job.points(elapsed, stopped).sorted()
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPoint:
+    """What the others and the front need of a refined point."""
+
+    F: np.ndarray  # (m,)
+    trajectory: Trajectory
+    method: Meshed  # the best of its `meshes`
+    meshes: list[Meshed]
+    note: str
+    good: bool
+    gain: float  # of other controls, see `Verdict.gain`
+    settled: bool  # whether it is good and gains no more than it may
+    columns: dict[str, Any] | None  # as a set of one point, see `Points`; None where it is as it was
+
+
+@dataclass(frozen=True, eq=False)
+class PointToRefine:
+    """A point on its first mesh, and where it goes from there."""
+
+    method: Meshed
+    z: np.ndarray  # (n,)
+    F: np.ndarray  # (m,)
+    trajectory: Trajectory
+    optimal: bool  # whether it is known to be, on this mesh
+    gaining: bool  # whether other controls are known to gain more than they may
+    others: Sequence[Trajectory]  # of its neighbours: further starts
+    hints: Sequence[Meshed]  # to begin on
+    far: Sequence[Meshed]  # the same if its error is large
+
+    def __call__(self, loop: MeshLoop, task: Scalarised, tolerance: float) -> RefinedPoint:
+        """The point of a task on finer meshes; within a tolerance it is feasible."""
+        nlp, z = loop.programs(self.method), self.z
+        # What gains already is to be seen where it begins.
+        conditions = Conditions.of(nlp, z, task.units) if self.gaining else None
+        multipliers = None if conditions is None else conditions.multipliers()
+        optimum = None if multipliers is None else OptimumMultipliers.at(nlp, z, multipliers)
+        begun = loop.on_mesh(self.method, z, self.F, self.trajectory, task.units, self.optimal, optimum)
+        hints = self.far if begun.verdict.error > FRONT.hinted else self.hints
+        # Rough controls would need finer meshes than optimal ones.
+        own = [] if self.optimal or hints else [self.method]
+        found = loop.refine(begun, task, self.others, list(dict.fromkeys([*hints, *own])))
+        best, columns = found.best, None
+        if not np.array_equal(best.z, z):
+            nlp = loop.programs(best.method)
+            certificate = certified(nlp, best.z[None], task.units) if best.by_gradients else {}
+            columns = trajectory_columns(nlp, best.z[None], tolerance) | certificate | {"trajectories": [best.trajectory]}
+        gain, good = best.verdict.gain, not found.complaints()
+        settled = good and gain <= loop.wanted.gained
+        return RefinedPoint(best.F, best.trajectory, best.method, found.meshes, found.note, good, gain, settled, columns)
+
+
+def _refined(loop: MeshLoop, begun: PointToRefine, task: Scalarised, tolerance: float) -> RefinedPoint:
+    """One piece of `FrontRefinement`."""
+    return begun(loop, task, tolerance)
 
 
 class FrontRefinement:
@@ -100,8 +158,7 @@ class FrontRefinement:
         self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, enough=enough, more=more)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
         self._first = first
-        self.found: dict[int, Refinement] = {}
-        self._rows: dict[int, Points] = {}
+        self.found: dict[int, RefinedPoint] = {}
 
     def go(self, show: Any = lambda words: None) -> None:
         """Refine all chosen points, or as many as the limits allow."""
@@ -118,33 +175,32 @@ class FrontRefinement:
         self.units = np.where(np.isnan(fixed), found, fixed)
         ends = self._ends()
         between = [i for i in self.chosen if i not in ends]
-        for i, task in self._tasks(ends, between):
-            if self.loop.ended:
-                return
-            done = len(self.found) + 1
-            show(f"meshes of the front: {f'end {done} of {len(ends)}' if i in ends else f'point {done} of {len(self.chosen)}'}")
-            self._refine(i, task)
-
-    def _tasks(self, ends: Mapping[int, LexicographicEnd], between: Sequence[int]) -> Iterator[tuple[int, Scalarised]]:
-        """Rows with their tasks on another mesh: ends first, then the points between, which move along with these: those that gain
-        most, then from the nearest on."""
-        yield from ends.items()
+        self._refine(ends, show)
         F, m = self.front.F, len(self.units)
         known = [i for i in ends if i in self.found] if len(ends) == m else []
-        moved = np.array([self.found[i].best.F for i in known]).reshape(-1, m)
+        moved = np.array([self.found[i].F for i in known]).reshape(-1, m)
+        # The points between move along with the ends.
         references, weights = moved_along(F[between], F[known], moved, self.units)
-        left = dict(zip(between, references, strict=True))
-        while left:
-            i = min(left, key=lambda j: (-self._gaining(j), min((self._distance(j, k) for k in self.found), default=0.0)))
-            yield i, Scalarised(left.pop(i), weights, units=self.units)
+        tasks = {i: Scalarised(one, weights, units=self.units) for i, one in zip(between, references, strict=True)}
+        left = dict(tasks)
+        while left and not self.loop.ended:
+            # First those that gain most, then from the nearest on.
+            row = sorted(left, key=lambda j: (-self._gaining(j), min((self._distance(j, k) for k in self.found), default=0.0)))
+            self._refine({i: left.pop(i) for i in row[: FRONT.together]}, show)
+        # Some began before their neighbours were done.
+        poor = {i: task for i, task in tasks.items() if i in self.found and not self.found[i].settled}
+        self._refine({i: task for i, task in poor.items() if self._hints(i, task)}, show)
 
     def points(self, elapsed: float, stopped: str) -> Points:
         """The front with the refined points, in the same order, and their costs."""
         front = self.front
-        rows = [self._rows.get(i, front[[i]]) for i in range(len(front))]
-        for i in set(self.chosen) - set(self.found):
-            rows[i] = rows[i].replace(notes=[NOT_BEGUN])
-        reached = sum(not found.complaints() for found in self.found.values())
+        rows, reached = [front[[i]] for i in range(len(front))], sum(point.good for point in self.found.values())
+        for i, one in ((i, self.found.get(i)) for i in self.chosen):
+            if one is None or one.columns is None:
+                rows[i] = rows[i].replace(notes=[NOT_BEGUN if one is None else one.note or front[i].note])
+            else:
+                about: dict[str, Any] = {"goals": front.goals, "problem": front.compiled(), "solver": front.solver, "stats": front.stats}
+                rows[i] = Points(**one.columns, notes=[one.note], **about)
         return Points.concatenate(rows).replace(
             tolerances=front.tolerances,
             within=front.within,
@@ -200,51 +256,47 @@ class FrontRefinement:
     def _distance(self, i: int, j: int) -> float:
         return float(np.linalg.norm((self.front.F[i] - self.front.F[j]) / self.units))
 
-    def _refine(self, i: int, task: Scalarised) -> None:
-        """Refine one point, and make its row of the new front."""
-        point = self.front[i]
-        known = self._known(i)
-        trajectory = self._trajectory(i)
-        nlp, z = self.loop.programs(self.methods[i]), point.decision
-        # What gains already is to be seen where it begins.
-        conditions = Conditions.of(nlp, z, self.units) if self._gaining(i) else None
-        multipliers = None if conditions is None else conditions.multipliers()
-        optimum = None if multipliers is None else OptimumMultipliers.at(nlp, z, multipliers)
-        begun = self.loop.on_mesh(self.methods[i], z, point.F, trajectory, self.units, known, optimum)
-        near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[: FRONT.neighbours]
-        done = [j for j in sorted(self.found, key=lambda j: self._distance(i, j)) if not self.found[j].complaints()]
-        near_meshes = [self._first] if self._first else self._meshes_near(done, begun.verdict.error, task)
-        # Rough controls would need finer meshes than optimal ones.
-        own = [] if known or near_meshes else [self.methods[i]]
-        hints = list(dict.fromkeys([*near_meshes, *own]))
+    def _refine(self, tasks: Mapping[int, Scalarised], show: Any) -> None:
+        """Refine some points side by side."""
+        if not tasks or self.loop.ended:
+            return
+        done = len(self.found)
+        show(f"meshes of the front: {counted(len(self.chosen), 'point')}, {done} done, {len(tasks)} in work")
         # One point that resists is not to take what is meant for the others.
-        share = (FRONT.of_end if isinstance(task, LexicographicEnd) else FRONT.of_one) / len(self.chosen)
-        with self.loop.at_most(share * self.loop.most_work):
-            self.found[i] = found = self.loop.refine(begun, task, [self._trajectory(j) for j in near], hints)
-        self._rows[i] = self._row(i, found.best, found.note)
+        share = max(FRONT.of_end if isinstance(task, LexicographicEnd) else FRONT.of_one for task in tasks.values()) / len(self.chosen)
+        pieces = [(self._begun(i, task), task, float(self.front.stats["tolerance"])) for i, task in tasks.items()]
+        found = self.loop.each(_refined, pieces, share * self.loop.most_work)
+        for i, one in zip(tasks, found, strict=True):
+            old = self.found.get(i)
+            if one is not None and (old is None or (one.good, -one.gain) > (old.good, -old.gain)):
+                self.found[i] = one
 
-    def _meshes_near(self, done: Sequence[int], error: float, task: Scalarised) -> list[Meshed]:
-        """Meshes to try first for a point with an error, in units of the tolerance: those of the nearest `done` point."""
-        if not done:
-            return []
-        nearest = self.found[done[0]]
-        if error > FRONT.hinted:
-            return nearest.meshes[-2:]
-        # Where no other mesh has to confirm it, its program is there already. An end is far from others.
-        return [] if self.wanted.confirmed or isinstance(task, LexicographicEnd) else [nearest.best.method]
+    def _begun(self, i: int, task: Scalarised) -> PointToRefine:
+        """A point as it is, with the meshes of the nearest one that is done."""
+        point, trajectory = self.front[i], self._trajectory(i)
+        near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[: FRONT.neighbours]
+        others, hints, done = [self._trajectory(j) for j in near], self._hints(i, task), self._nearest(i)
+        far = hints if self._first or done is None else done.meshes[-2:]
+        return PointToRefine(
+            self.methods[i], point.decision, point.F, trajectory, self._known(i), self._gaining(i) > 0.0, others, hints, far
+        )
+
+    def _nearest(self, i: int) -> RefinedPoint | None:
+        """The nearest other point that is settled, on another mesh than those that were tried."""
+        tried = self.found[i].meshes if i in self.found else ()
+        done = [j for j, one in self.found.items() if one.settled and j != i and one.method not in tried]
+        return self.found[min(done, key=lambda j: self._distance(i, j))] if done else None
+
+    def _hints(self, i: int, task: Scalarised) -> list[Meshed]:
+        """The mesh of the nearest point, whose program is there already; none for an end, which is far from others, and where another mesh
+        has to confirm a point anyway."""
+        if self._first:
+            return [] if i in self.found else [self._first]
+        nearest = self._nearest(i)
+        return [] if nearest is None or self.wanted.confirmed or isinstance(task, LexicographicEnd) else [nearest.method]
 
     def _trajectory(self, i: int) -> Trajectory:
         found = self.found.get(i)
-        trajectory = self.front[i].trajectory if found is None else found.best.trajectory
+        trajectory = self.front[i].trajectory if found is None else found.trajectory
         assert trajectory is not None
         return trajectory
-
-    def _row(self, i: int, best: OnMesh, note: str) -> Points:
-        """A point on its best mesh, as a set of one point."""
-        front = self.front
-        if np.array_equal(best.z, front[i].decision):
-            return front[[i]].replace(notes=[note or front[i].note])
-        nlp = self.loop.programs(best.method)
-        found = certified(nlp, best.z[None], self.units) if best.by_gradients else {}
-        about: dict[str, Any] = {**found, "notes": [note], "trajectories": [best.trajectory]}
-        return from_vectors(nlp, best.z[None], front.solver, front.stats, **about)

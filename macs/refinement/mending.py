@@ -112,7 +112,8 @@ class _Mending:
         self.points, self.verify, self.show = points, verify, show
         self._gain = SEARCH.optimum * verify  # what other controls may gain, as for a single optimum
         # Points are filled up from the first meshes, too, after others were refined.
-        self.programs, self.simulations = Programs(problem, kept=MENDING.meshes), Simulations(problem, verify)
+        there = {from_dict(one) for one in points.transcriptions if one}
+        self.programs, self.simulations = Programs(problem, MENDING.meshes, there), Simulations(problem, verify)
         self._solves = GradientSolves(float(points.stats["tolerance"]))
         self._work, self._scales, self.missing = points.stats.get("work", 0), None, ""
         self.ends = None if ends is None else self.marked(ends)
@@ -294,13 +295,11 @@ class _Mending:
         wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False, gain=self._gain if gaining else np.inf)
         scales = objective_scales(points)
 
-        def enough(point: OnMesh) -> bool:
-            return not point.gaining and largest_miss(self.programs.problem, point.verdict.simulation, point.F, scales) <= limits
-
         # Where only objectives are off, those of the simulation are known, too.
         blurred = fine is None and bool(feasible_as_simulated(points, self.verify)[rows].all())
         most = self._most_work(points, 0 if gaining else len(rows), fine, 0.0 if blurred or gaining else MENDING.share)
         most += more * self._work
+        enough = partial(_enough, scales, limits)
         job = FrontRefinement(points, wanted, MENDING.meshes, rows, most, self.programs, enough, MENDING.patience, first=fine)
         job.go(self.show)
         again = self.marked(job.points(0.0, ""))
@@ -315,6 +314,11 @@ class _Mending:
         spent = points.stats.get("work", 0) - self._work + WORK.building * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places])) if fine is None else len(self.programs(fine).variables)
         return max(share * self._work - spent, MENDING.each * count * size, MENDING.least)
+
+
+def _enough(scales: np.ndarray, limits: float, point: OnMesh) -> bool:
+    """Whether a simulation confirms a point within the limits, in scales (m,), and other controls gain little."""
+    return not point.gaining and largest_miss(point.verdict.problem, point.verdict.simulation, point.F, scales) <= limits
 
 
 def _slightly_outside(points: Points, verify: float) -> list[int]:

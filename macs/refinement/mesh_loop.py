@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,9 +26,12 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.tables import rough_tables
 from transcription.trajectories.trajectory import Trajectory
 
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, Counts
 from ..gradients.scalarised import WORK, GradientSolves, LexicographicEnd, Scalarised, Start, best_of
+from ..io.workers import each
 from ..pareto.dominance import objective_units, stated_scales
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -54,19 +59,34 @@ TROUBLES = {"": "its mesh cannot be refined further", CONVERGED: "finer meshes d
 
 
 class Programs:
-    """Cache of the latest NLPs of a problem on meshes, which take some ten megabytes each; those that a search keeps anyway are reused."""
+    """Cache of the latest NLPs of a problem on meshes, which take some ten megabytes each; those that a search keeps anyway are reused.
 
-    def __init__(self, problem: CompiledProblem, kept: int = LOOP.kept) -> None:
-        self.problem, self.built, self._made = problem, 0, lru_cache(kept)(self._make)
+    What was `built` are the methods that were not `there` at first, each once, whichever process made its program, and how often.
+    """
+
+    def __init__(self, problem: CompiledProblem, kept: int = LOOP.kept, there: Iterable[Transcription] = ()) -> None:
+        self.problem, self.sizes, self._kept = problem, dict.fromkeys(there, 0), kept
+        self._made = lru_cache(kept)(lambda method: method.transcribe(problem))
 
     def __call__(self, method: Transcription) -> NLP:
         """The NLP of the problem on these meshes."""
-        return kept_nlp(self.problem, method) or self._made(method)
-
-    def _make(self, method: Transcription) -> NLP:
-        nlp = method.transcribe(self.problem)
-        self.built += len(nlp.variables)
+        nlp: NLP = kept_nlp(self.problem, method) or self._made(method)
+        self.sizes.setdefault(method, len(nlp.variables))
         return nlp
+
+    @property
+    def built(self) -> int:
+        """Variables of all programs that were built."""
+        return sum(self.sizes.values())
+
+    def apart(self, sizes: Mapping[Transcription, int]) -> Programs:
+        """The same programs, counted from given `sizes` on."""
+        other = copy(self)
+        other.sizes = dict(sizes)
+        return other
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Programs, (self.problem, self._kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,6 +206,16 @@ class MeshLoop:
     def work(self) -> float:
         """Work so far, in iterations times variables."""
         return self.solves.counts.work + WORK.building * (self.programs.built - self._built)
+
+    def each(self, do: Callable[..., Result], pieces: Sequence[tuple[Any, ...]], most: float = np.inf) -> list[Result | None]:
+        """`do(loop, *piece)` of independent pieces side by side (`io.workers`), each with a loop of its own that may do an equal part
+        of the work that is left, and at `most` so much; None of one that ended before it gave anything."""
+        solves, work = self.solves, min(most, self.left / max(len(pieces), 1))
+        limits = solves.tolerance, solves.max_iterations, self.wanted, self.limit, work, self.enough, self.more
+        found = each(_alone, self.programs, [(self.programs.sizes, *limits, do, *piece) for piece in pieces])
+        for _, counts, sizes in found:
+            solves.counts, self.programs.sizes = solves.counts.joined(counts), self.programs.sizes | sizes
+        return [one for one, *_ in found]
 
     @staticmethod
     def units(F: np.ndarray, nlp: NLP, z: np.ndarray) -> np.ndarray:
@@ -345,6 +375,26 @@ class MeshLoop:
         self.solves.counts.work += int(near.iterations.sum()) * len(nlp.variables)
         self.solves.counts.clocked += near.clocked
         return Solved(near.z[0], near.F[0], float(near.violation[0]), str(near.status[0]), int(near.iterations[0])), False
+
+
+def _alone(
+    programs: Programs,
+    sizes: Mapping[Transcription, int],
+    tolerance: float,
+    iterations: int,
+    wanted: Wanted,
+    limit: int,
+    work: float,
+    enough: Callable[[OnMesh], bool] | None,
+    more: bool,
+    do: Callable[..., Result],
+    *piece: Any,
+) -> tuple[Result | None, Counts, dict[Transcription, int]]:
+    """One piece of `MeshLoop.each`, its costs, and the sizes of all programs by then."""
+    loop, found = MeshLoop(programs.apart(sizes), GradientSolves(tolerance, iterations), wanted, limit, work, enough, more), None
+    with suppress(Stopped):
+        found = do(loop, *piece)
+    return found, loop.solves.counts, loop.programs.sizes
 
 
 def differentiable(problem: CompiledProblem) -> bool:
