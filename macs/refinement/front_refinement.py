@@ -49,7 +49,7 @@ class FrontLimits:
     of_end: float = 6.0  # what an end may take of the work that is allowed, in equal shares of it
     of_one: float = 2.0  # the same for any other point
     neighbours: int = 2  # points whose trajectories are further starts of one
-    together: int = 4  # points that are refined before others begin on their meshes
+    together: int = 4  # points that are refined side by side, before others begin on their meshes
 
 
 FRONT = FrontLimits()

@@ -103,7 +103,9 @@ def test_what_is_no_number_of_processes_is_refused_before_any_work(wrong):
 def test_the_same_bits_with_any_number_of_processes(eager):
     def fronts(workers: int) -> list[Front]:
         problem = load("goddard")
-        return [sweep(problem, DFET(4, 4), points=6, workers=workers), MACS().solve(problem, seed=3, workers=workers)]
+        coarse = sweep(problem, DFET(4, 4), points=6, workers=workers)
+        finer = coarse.refine(1e-6, workers=workers)
+        return [coarse, finer, MACS().solve(problem, seed=3, workers=workers)]
 
     first = fronts(1)
     for count in (2, 3):

@@ -1,6 +1,7 @@
 """Meshes that are found where none is given: for a search, and for a single optimum; honest where no solve converges."""
 
 import gc
+import pickle
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -337,10 +338,12 @@ def test_work_ends_where_it_is_to_end():
 
 def test_programs_that_a_search_has_are_not_made_again():
     problem = time_against_effort().compile()
-    fine, searched, programs = DFET(4, 3), DFET(2, 3), Programs(problem)
+    fine, searched, programs = DFET(4, 3), DFET(2, 3), Programs(problem, there=[DFET(2, 3)])
     assert programs(fine) is programs(fine) is not fine.nlp(problem) and programs.built == len(fine.nlp(problem).variables)
     assert Programs(problem)(searched) is not searched.nlp(problem), "without a search nothing is kept for good"
     assert programs(searched) is searched.nlp(problem) and programs.built == len(fine.nlp(problem).variables)
+    other = pickle.loads(pickle.dumps(programs)).apart(programs.sizes)
+    assert other(fine) is not programs(fine) and other.built == programs.built, "whichever process makes a program counts nothing twice"
 
 
 @pytest.mark.slow
