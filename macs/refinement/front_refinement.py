@@ -31,6 +31,7 @@ from ..gradients.ends import moved_along
 from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised
 from ..io.console import working
 from ..io.text import counted
+from ..io.workers import TOGETHER
 from ..pareto.dominance import extremes
 from .mesh_loop import MeshLoop, OnMesh, Programs, differentiable
 
@@ -49,7 +50,6 @@ class FrontLimits:
     of_end: float = 6.0  # what an end may take of the work that is allowed, in equal shares of it
     of_one: float = 2.0  # the same for any other point
     neighbours: int = 2  # points whose trajectories are further starts of one
-    together: int = 4  # points that are refined side by side, before others begin on their meshes
 
 
 FRONT = FrontLimits()
@@ -184,9 +184,9 @@ class FrontRefinement:
         tasks = {i: Scalarised(one, weights, units=self.units) for i, one in zip(between, references, strict=True)}
         left = dict(tasks)
         while left and not self.loop.ended:
-            # First those that gain most, then from the nearest on.
+            # First those that gain most, then from the nearest on; the next ones begin on the meshes of these.
             row = sorted(left, key=lambda j: (-self._gaining(j), min((self._distance(j, k) for k in self.found), default=0.0)))
-            self._refine({i: left.pop(i) for i in row[: FRONT.together]}, show)
+            self._refine({i: left.pop(i) for i in row[: TOGETHER // 2]}, show)
         # Some began before their neighbours were done.
         poor = {i: task for i, task in tasks.items() if i in self.found and not self.found[i].settled}
         self._refine({i: task for i, task in poor.items() if self._hints(i, task)}, show)
