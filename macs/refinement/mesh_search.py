@@ -206,30 +206,20 @@ class TaskOptima:
         self.all: list[MeshedOptimum] = []
         self._units = np.full(len(task.weights), np.inf)
 
-    def add(
-        self,
-        method: Meshed,
-        nlp: NLP,
-        solved: Solved,
-        rule: MultistartStopping,
-        ends: Sequence[np.ndarray] = (),
-        alpha: float | None = None,
-    ) -> None:
-        """Refine the result of a solve on a coarse mesh if it converged; `ends` are the objectives (m,) of the other ends of a front, and
-        `alpha` is what the optimum is where the starts of the rule were made, if that is elsewhere."""
-        loop = self.loop
-        one = MeshedOptimum(method, nlp, solved, rule, self.task.loss(solved.F) if alpha is None else alpha)
-        if solved.status == CONVERGED:
-            # Objectives that are large only where an attempt is poor are not to be judged by that.
-            self._units = units = np.minimum(self._units, loop.units(np.array([solved.F, *ends]), nlp, solved.z))
-            task = replace(self.task, units=units) if self.end is None else LexicographicEnd.of(self.end, units, solved.F)
-            with suppress(Stopped), loop.solves.within(loop.left):
-                found = loop.refine(loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), units, True), task)
-                best, loss, unit = found.best, self.task.loss(found.best.F), float(units[self.task.moving][0])
-                known = [] if best.achieved is None else [self.task.loss(best.achieved) + best.doubt * unit]
-                known += [loss - found.worse * unit] if found.worse else []
-                achieved, own = min(known, default=np.inf), loop.programs(best.method)
-                one = replace(one, nlp=own, refinement=found, unit=unit, loss=loss, achieved=achieved)
+    def scaled(self, nlp: NLP, solved: Solved, ends: Sequence[np.ndarray]) -> Scalarised:
+        """The task in units of the result of a solve, and of the objectives (m,) of the other `ends` of a front."""
+        # Objectives that are large only where an attempt is poor are not to be judged by that.
+        self._units = units = np.minimum(self._units, self.loop.units(np.array([solved.F, *ends]), nlp, solved.z))
+        return replace(self.task, units=units) if self.end is None else LexicographicEnd.of(self.end, units, solved.F)
+
+    def take(self, one: MeshedOptimum, found: Refinement | None) -> None:
+        """Add an optimum, refined if it is."""
+        if found is not None:
+            best, loss, unit = found.best, self.task.loss(found.best.F), float(self._units[self.task.moving][0])
+            known = [] if best.achieved is None else [self.task.loss(best.achieved) + best.doubt * unit]
+            known += [loss - found.worse * unit] if found.worse else []
+            achieved, own = min(known, default=np.inf), self.loop.programs(best.method)
+            one = replace(one, nlp=own, refinement=found, unit=unit, loss=loss, achieved=achieved)
         self.all.append(one)
 
     @property
@@ -239,6 +229,29 @@ class TaskOptima:
         behind = [max((one.loss - least) / one.unit, 0.0) if np.isfinite(one.loss) and np.isfinite(least) else 0.0 for one in self.all]
         behind = [amount if amount > settled else 0.0 for amount in behind]
         return min((replace(one, behind=amount) for one, amount in zip(self.all, behind, strict=True)), key=lambda one: one.rank(settled))
+
+
+Coarse = tuple[TaskOptima, Solved, MultistartStopping, Sequence[np.ndarray], float | None]
+"""A result on a coarse mesh: of which task, from starts by which rule, objectives (m,) of the other ends, and its alpha where the starts
+were made; by default its own."""
+
+
+def refine_together(loop: MeshLoop, method: Meshed, several: Sequence[Coarse]) -> None:
+    """Refine results of solves on a coarse mesh, those that converged, side by side, and add them to their optima."""
+    nlp, pieces = loop.programs(method), {}
+    for k, (optima, solved, _, ends, _) in enumerate(several):
+        if solved.status == CONVERGED:
+            pieces[k] = (method, solved, optima.scaled(nlp, solved, ends))
+    found = dict(zip(pieces, loop.each(_refined, [*pieces.values()]), strict=True))
+    for k, (optima, solved, rule, _, alpha) in enumerate(several):
+        optima.take(MeshedOptimum(method, nlp, solved, rule, optima.task.loss(solved.F) if alpha is None else alpha), found.get(k))
+
+
+def _refined(loop: MeshLoop, method: Meshed, solved: Solved, task: Scalarised) -> Refinement:
+    """The refinement of a result on a coarse mesh."""
+    nlp = loop.programs(method)
+    with loop.solves.within(loop.left):
+        return loop.refine(loop.on_mesh(method, solved.z, solved.F, nlp.unpack(solved.z), task.units, True), task)
 
 
 class MeshSearch:
@@ -322,16 +335,13 @@ class MeshSearch:
         if not self._begun and any(one.status == CONVERGED for one in best):
             # What it took to find the first optima is not limited; refining them, and other meshes, are.
             self.loop.most_work, self._begun = self.loop.most_work + self.loop.work, True
-        left = len(best)
-        for optima, one, other, rule in zip(self.tasks, first, best, rules, strict=True):
-            left -= 1
-            if optima.all and optima.best.good:
-                continue
+        coarse = list[Coarse]()
+        for optima, other, rule in zip(self.tasks, best, rules, strict=True):
             front = [end.F for end in best if self._ends and end is not other and end.status == CONVERGED]
-            with self.loop.at_most(self.loop.left / (left + 1)):
-                optima.add(method, nlp, other, rule, front)
-            if other is not one and not self._ends and not optima.best.good and not self.loop.ended:
-                optima.add(method, nlp, one, rule)
+            coarse += [] if optima.all and optima.best.good else [(optima, other, rule, front, None)]
+        refine_together(self.loop, method, coarse)
+        if coarse and not self._ends and best[0] is not first[0] and not self.tasks[0].best.good and not self.loop.ended:
+            refine_together(self.loop, method, [(self.tasks[0], first[0], rules[0], (), None)])
 
     def _elsewhere(self, i: int) -> None:
         """Solve from the best optimum, other optima of the coarse mesh and other starts on an even mesh as fine as its own, if that takes
@@ -375,7 +385,7 @@ class MeshSearch:
             for solved in promising[: SEARCH.refined]:
                 if not loop.ended:
                     own = solved is found[0]  # the same optimum on this mesh
-                    optima.add(method, nlp, solved, best.rule if own else rule, alpha=best.alpha if own else None)
+                    refine_together(loop, method, [(optima, solved, best.rule if own else rule, (), best.alpha if own else None)])
 
 
 def even(method: Meshed) -> Meshed:
