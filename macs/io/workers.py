@@ -75,9 +75,9 @@ def each(do: Callable[..., Result], shared: Any, pieces: Sequence[tuple[Any, ...
     Where the work is asked to end (`transcription.stopping`), so is each piece.
     """
     helpers = _HELPERS.get()
-    if helpers is None or len(pieces) < 2:
+    if helpers is None:
         return [do(shared, *piece) for piece in pieces]
-    return helpers.each(do, shared, pieces)
+    return helpers.each(do, shared, pieces) if len(pieces) > 1 else helpers.alone(do, shared, pieces)
 
 
 class Helpers:
@@ -88,6 +88,13 @@ class Helpers:
         self._count, self._executor, self._given = count, executor, executor is not None
         self._seconds, self._killed = 0.0, 0
         self._taught: dict[str, list[Future[Any]]] = {}
+        self._awake: Future[Any] | None = None  # done once there is a process
+
+    def alone(self, do: Callable[..., Result], shared: Any, pieces: Sequence[tuple[Any, ...]]) -> list[Result]:
+        """See `each` beside this class, of a piece that has to be done before others: here, while processes begin that these will need."""
+        if self._awake is None and self._worth and not self._given:
+            self._awake = self._submit(os.getpid)
+        return [self._here(do, shared, piece).result() for piece in pieces]
 
     def each(self, do: Callable[..., Result], shared: Any, pieces: Sequence[tuple[Any, ...]]) -> list[Result]:
         """See `each` beside this class."""
@@ -149,6 +156,8 @@ class Helpers:
             return 0
         if digest not in self._taught:
             self._taught[digest] = [self._submit(_learn, digest, data) for _ in range(self._count)]
+            if self._awake is not None and self._awake.done() and left <= 2 * self._count:
+                wait(self._taught[digest], timeout=0.3)  # this process would have done most of so few by then
         outcomes = [one.exception() for one in self._taught[digest] if one.done()]
         if wrong := [error for error in outcomes if error is not None and not isinstance(error, BrokenProcessPool)]:
             _alone(str(wrong[0]).rsplit("\n", 1)[-1])
