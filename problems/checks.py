@@ -80,17 +80,13 @@ def whole(value: Any, what: str) -> tuple[float, float]:
 
 
 def choices(values: Any, what: str) -> tuple[Any, ...]:
-    """Two or more different texts, numbers or truth values, of one kind."""
-    if isinstance(values, str) or not isinstance(values, Iterable) or len(labels := tuple(values)) < 2:
-        raise ValueError(f"the choices of {what} must be two or more, not {shown(values)}")
+    """Two or more different texts, numbers or truth values."""
+    labels = () if isinstance(values, str) or not isinstance(values, Iterable) else tuple(values)
     labels = tuple(one.item() if isinstance(one, np.generic) else one for one in labels)
+    if len(labels) < 2 or len({*map(str, labels)}) < len(labels) or not all(isinstance(one, str | bool | int | float) for one in labels):
+        raise ValueError(f"the choices of {what} must be two or more different texts, numbers or truth values, not {shown(values)}")
     for label in labels:
-        if isinstance(label, str):
-            check_text(label, f"a choice of {what}")
-        elif not isinstance(label, bool | int | float) or not math.isfinite(label):
-            raise ValueError(f"a choice of {what} must be a text, a number or a truth value, not {shown(label)}")
-    if len({str(label) for label in labels}) < len(labels):
-        raise ValueError(f"two choices of {what} are the same: {', '.join(map(str, labels))}")
+        check_text(str(label), f"a choice of {what}")
     return labels
 
 

@@ -17,6 +17,7 @@ from problems.vector import SAMPLED, CompiledVectorProblem, real_numbers
 from transcription.stopping import Stopped
 from transcription.trajectories.limits import excess
 
+from ..io.interrupts import at_once
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
 
 log = logging.getLogger(__name__)
@@ -94,7 +95,7 @@ class BlackBox(Evaluator):
     def _values(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `CompiledVectorProblem.evaluate`. Ctrl-C that the function hears ends the search."""
         try:
-            with errors_located(self.problem, Z):
+            with at_once(), errors_located(self.problem, Z):
                 return self.problem.evaluate(Z)
         except KeyboardInterrupt:
             raise Stopped("interrupted") from None

@@ -18,6 +18,7 @@ from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_
 
 __all__ = ["Interrupts", "Stopped", "spending", "work_on_trajectories"]
 
+_AT_ONCE: ContextVar[bool] = ContextVar("interrupted at once", default=False)
 _SPENT: ContextVar[dict[str, float] | None] = ContextVar("spent", default=None)
 
 TIME_LIMIT = "time limit"
@@ -87,6 +88,18 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         self._interrupted = True
         if self._whole is not None and not self._whole._interrupted:
             self._whole._interrupt(number, frame)
+        if _AT_ONCE.get():
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def at_once() -> Iterator[None]:
+    """Within, as in a function of the user's, which may wait for processes that died of it, the first Ctrl-C interrupts as usual."""
+    token = _AT_ONCE.set(True)
+    try:
+        yield
+    finally:
+        _AT_ONCE.reset(token)
 
 
 @contextmanager
