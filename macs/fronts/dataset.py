@@ -346,8 +346,7 @@ def costates_of_point(weights: np.ndarray, phases: Mapping[str, PhaseCostates | 
 def root_dataset(front: Points) -> Labelled:
     """Everything of a front but its trajectories."""
     parameters = [
-        dict(zip((v.name for v in point.variables), point.decision.tolist(), strict=True)) if not front.dynamic else point.parameters
-        for point in front
+        p.parameters if front.dynamic else dict(zip([v.name for v in p.variables], p.decision.tolist(), strict=True)) for p in front
     ]
     names = list(dict.fromkeys(name for row in parameters for name in row))
     units = {variable.name: variable.unit for variable in front.variables}

@@ -122,8 +122,7 @@ def individual_actions(trials: Trials) -> None:
     order = rng.permuted(np.tile(np.arange(d), (count, 1)), axis=1)
     filled = state.parents if variant.breeding else state.archive  # where nothing is bred, agents alone lower violations
     every, some = (settings.coordinates_to_scan(d, points, m, trials.planned) for points in (0, len(filled)))
-    if box.whole is not None:  # `try_neighbours` has steps of whole numbers and choices
-        some = int(np.isinf(box.designs))
+    some = some if box.whole is None else int(np.isinf(box.designs))  # steps of whole numbers are those of `try_neighbours`
     scanned = np.where(undirected, every, some)
     for tried, coordinate in enumerate(order.T[: scanned[acting].max()]):
         length = rng.random((2, count)) * agents.rho / 2
