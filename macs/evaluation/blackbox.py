@@ -333,8 +333,7 @@ def _pymoo_variables(problem: Any, bounds: Any) -> tuple[Variable, ...]:
     return _whole(read_bounds(bounds), not real)
 
 
-_PYMOO = ("Real", "Integer", "Binary", "Choice")
-"""Classes of pymoo's variables."""
+_PYMOO = ("Real", "Integer", "Binary", "Choice")  # classes of pymoo's variables
 
 
 def _pymoo_variable(name: str, one: Any, what: str) -> Variable:

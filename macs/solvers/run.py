@@ -102,9 +102,8 @@ class SearchRun:
         """Why the run has ended, after its last round; empty if another follows."""
         if self.call.evaluations is not None and self.evaluator.counts.evaluations >= self.call.evaluations:
             return "budget"
-        if self.evaluator.exhausted:
-            return "done"
-        return self.solver.ended(self._state) or ("idle" if self._idle >= IDLE_ITERATIONS else "")
+        done = "done" if self.evaluator.exhausted else self.solver.ended(self._state)
+        return done or ("idle" if self._idle >= IDLE_ITERATIONS else "")
 
     def _search_round(self) -> None:
         """Search up to the budget, or to the end of the current round."""
@@ -143,8 +142,8 @@ class SearchRun:
         counts = self.evaluator.counts
         self._uncut = counts.clocked
         if self._checkpoint:
-            told = self._idle, self._interrupts.elapsed, stopped, self.evaluator.memory
-            self._checkpoint.keep(self._state, RunStatus(self._seed, counts, *told))
+            told = counts, self._idle, self._interrupts.elapsed, stopped, self.evaluator.memory
+            self._checkpoint.keep(self._state, RunStatus(self._seed, *told))
 
     def _cut_short(self) -> bool:
         """Whether a time limit, Ctrl-C or the callback has cut work short since the state was last kept."""
