@@ -113,13 +113,15 @@ class MultistartStopping:
 
     def __init__(self, better: float = MULTISTART.better) -> None:
         self._losses: list[float] = []
+        self.results: list[float] = []  # losses in the order of the starts, NaN for one that ended at no optimum
         self.starts, self.convex = 0, False  # convex: for given times, and these were tried: no start finds another optimum
         self._last, self._better, self.accuracy = 0, better, 0.0  # accuracy of losses, whatever their size: near zero that says nothing
 
     def add(self, loss: float | None) -> bool:
         """Count a solve that ended at an optimum with this loss, or at none; returns whether it is the best so far."""
         self.starts += 1
-        if loss is None:
+        self.results.append(np.nan if loss is None else loss)
+        if loss is None or not np.isfinite(loss):
             return False
         better = not self._losses or loss < min(self._losses) - MULTISTART.rounding * abs(loss)
         self._losses.append(loss)

@@ -8,6 +8,7 @@ no worse.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from transcription.stopping import stopping
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_between
-from ..gradients.multistart import MULTISTART, MultistartSolver, Starts, guessed_start
+from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
 from ..io.workers import TOGETHER
@@ -56,9 +57,17 @@ class Opening:
     """
 
     def __init__(
-        self, evaluator: Evaluator, Z: np.ndarray, given: int, gradients: bool, points: int, budget: int, rng: np.random.Generator
+        self,
+        evaluator: Evaluator,
+        Z: np.ndarray,
+        given: int,
+        gradients: bool,
+        points: int,
+        budget: int,
+        rng: np.random.Generator,
+        rules: Mapping[int, MultistartStopping],
     ) -> None:
-        self._evaluator, self._Z, self._given, self._budget, self._rng = evaluator, Z, given, budget, rng
+        self._evaluator, self._Z, self._given, self._budget, self._rng, self._rules = evaluator, Z, given, budget, rng, rules
         self._points = min(points, GRADIENT_RULES.first_points)
         gradients = gradients and isinstance(evaluator, Bilevel)
         quick = gradients and bool(evaluator.ways)
@@ -66,8 +75,7 @@ class Opening:
         if quick and 0 < given < len(Z):
             self.population = self.population.joined(evaluator.evaluate(Z[given:], 0))
         self.evaluations, self.optima = [self.population], self.population.take(np.arange(0))
-        self.closest = self.optima
-        self.multimodal, self.unimodal = False, np.zeros(self.population.F.shape[1], dtype=bool)
+        self.closest, self.starts = self.optima, np.empty((0, 2))
         solver = self._solver() if quick or (gradients and not self._feasible.any()) else None
         if quick and not self._feasible.any() and not self._decided(solver) and evaluator.counts.evaluations < budget:
             self._project()
@@ -99,14 +107,17 @@ class Opening:
         violation = np.where(known, seen.violation, np.inf)
         start = guessed_start(self._evaluator.nlp)
         if known[given].any():
-            start = self._Z[[np.argmin(violation[given])]]  # as it was given: propagated states may be far from those
+            # As they were given: propagated states may be far from those.
+            start = self._Z[given][known[given]] if self._rules else self._Z[[np.argmin(violation[given])]]
         elif start is None and known.any():
             start = seen.Z[[np.argmin(violation)]]
         if start is None:
             return None
         count = None if self._evaluator.ways else 1
         solves, most = _counted_by(self._evaluator), self._budget // GRADIENT_RULES.evaluations_per_start
-        return MultistartSolver(self._evaluator.nlp, start, count, self._rng, solves, GRADIENT_RULES.better, most)
+        solver = MultistartSolver(self._evaluator.nlp, start, count, self._rng, solves, GRADIENT_RULES.better, most)
+        solver.stopping.update({} if count else self._rules)
+        return solver
 
     def _decided(self, solver: MultistartSolver | None) -> bool:
         """Whether a gradient solve for the first objective ends at an optimum, or solves for feasibility find that there is none."""
@@ -122,14 +133,13 @@ class Opening:
         each by multistart. Fewer if asked to end early, or if solves fail."""
         # The polish improves ends, too; where few starts are worth making, long solves are not, either.
         with solver.solves.at_most(MULTISTART.iterations if solver.starts else MOST_ITERATIONS):
-            first = solver.single(0)
+            first = self._single(solver, 0)
             if solver.starts and first.status != CONVERGED:
                 return self.optima  # agents' own solves begin elsewhere
-            found = lexicographic_ends(solver, lambda i: solver.single(i) if i else first, WORK.most)
-            self.multimodal = any(one.several for one in solver.stopping.values())
-            for i, one in solver.stopping.items():
-                self.unimodal[i] = one.enough and not one.several
-            if self.unimodal.all():
+            found = lexicographic_ends(solver, lambda i: self._single(solver, i) if i else first, WORK.most)
+            rows = [(i, loss) for i, one in solver.stopping.items() for loss in [*one.results, *[-np.inf] * one.convex]]
+            self.starts = np.array(rows).reshape(-1, 2)
+            if alike(self.starts, len(found)):
                 solver.most = 0  # nothing else is expected between the ends, either
             if 1 < len(found) == sum(one.status == CONVERGED for one in found):
                 F = np.array([one.F for one in found])
@@ -140,36 +150,62 @@ class Opening:
         assert isinstance(self._evaluator, Bilevel)
         return _feasible_of(found, self._evaluator)
 
+    @staticmethod
+    def _single(solver: MultistartSolver, i: int) -> Solved:
+        """The optimum of objective i, from other starts, too, if that known on another mesh leads to none."""
+        solved = solver.single(i)
+        if solved.status != CONVERGED and solver.stopping.pop(i, None):
+            solved = solver.single(i)
+        return solved
+
+
+def _rules(starts: np.ndarray, m: int, better: float) -> list[MultistartStopping]:
+    """What starts (k, 2) say of each of m objectives; see `GradientMemory.starts`."""
+    rules = [MultistartStopping(better) for _ in range(m)]
+    for i, loss in starts.tolist():
+        rules[int(i)].convex |= loss == -np.inf
+        rules[int(i)].add(loss)
+    return rules
+
+
+def alike(starts: np.ndarray, m: int) -> bool:
+    """Whether starts enough to begin with led to one optimum of each objective."""
+    return all(one.enough and one.converged and not one.several for one in _rules(starts, m, GRADIENT_RULES.better))
+
+
+def unsettled(starts: np.ndarray, m: int) -> list[int]:
+    """Objectives with several optima that had not starts enough."""
+    return [i for i, one in enumerate(_rules(starts, m, MULTISTART.better)) if one.several and not one.enough]
+
 
 def restart_solves(
-    archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, unimodal: np.ndarray, rng: np.random.Generator
-) -> tuple[Evaluation, bool]:
-    """The results of `count` gradient solves from other starts, for the ends of the front and points along it in turn; fewer if asked to
-    end early; and whether one of them ended at a worse optimum than the known one. If only some objectives have several optima, only their
-    ends are solved again."""
+    archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, open_ends: Sequence[int], rng: np.random.Generator
+) -> tuple[Evaluation, np.ndarray]:
+    """The results of `count` gradient solves from other starts, for points along the front and its ends in turn, fewer if asked to end
+    early; and what ends were found from them, see `GradientMemory.starts`. Of three solves two are for `open_ends`; without any, one is for
+    an end."""
     solver = MultistartSolver(evaluator.nlp, archive.Z, 1, rng, _counted_by(evaluator))
-    m, span = archive.F.shape[1], ranges(archive.F)
-    ends = archive.F[extremes(archive.F)]
-    singles = [Scalarised.single(i, m) for i in range(m) if unimodal.all() or not unimodal[i]]
+    m, ends = archive.F.shape[1], archive.F[extremes(archive.F)]
+    singles = open_ends or range(m)
     between = tasks_between(ends, np.ptp(ends, axis=0), max(min(points, GRADIENT_RULES.first_points), m + 1), METHODS[0]) if m > 1 else []
-    found, worse = list[Solved](), False
+    found, starts, share = list[Solved](), list[tuple[int, float]](), 2 if open_ends else 1
     while len(found) < count and not stopping():
-        tasks, starts = list[Scalarised](), list[np.ndarray]()
+        begun = list[tuple[np.ndarray, Scalarised]]()
         for k in range(drawn + len(found), drawn + min(len(found) + TOGETHER, count)):
-            # Ends are what points between them follow: two starts for these, and one for one of those, in turn.
-            inner = bool(between) and k % 3 == 2
-            turn, which = divmod(k // 3, len(between)) if inner else divmod(k - k // 3 if between else k, len(singles))
-            tasks.append((between if inner else singles)[which])
-            starts.append(Starts(evaluator.nlp, rng, MULTISTART.everywhere + turn + which).draw(solver.nearest(tasks[-1]))[0])
+            round_of_three, place = divmod(k, 3)
+            inner = bool(between) and place >= share
+            number = k if not between else round_of_three * (3 - share if inner else share) + place - share * inner
+            turn, which = divmod(number, len(between) if inner else len(singles))
+            task = between[which] if inner else Scalarised.single(singles[which], m)
+            begun.append((Starts(evaluator.nlp, rng, MULTISTART.everywhere + turn + which).draw(solver.nearest(task))[0], task))
         with solver.solves.at_most(MULTISTART.iterations):
-            solved = solver.from_vectors(list(zip(starts, tasks, strict=True)))
+            solved = solver.from_vectors(begun)
         found += solved
-        for task, one in zip(tasks, solved, strict=True):
-            alpha, known = task.optimum(one), solver.merits(task, archive.F, archive.violation).min()
-            worse |= alpha is not None and bool(
-                alpha > known + MULTISTART.same * (span / np.where(task.moving, task.weights, np.inf)).max()
-            )
-    return _feasible_of(found, evaluator), worse
+        for (_, task), one in zip(begun, solved, strict=True):
+            if np.count_nonzero(task.used) == 1:
+                optimum = task.optimum(one)
+                starts.append((int(np.argmax(task.used)), np.nan if optimum is None else optimum))
+    return _feasible_of(found, evaluator), np.array(starts).reshape(-1, 2)
 
 
 def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) -> None:
@@ -177,10 +213,11 @@ def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) ->
     rounds = state.rounds if evaluator.has_gradients else None
     if rounds is None or not (settings.refines and isinstance(evaluator, Bilevel) and evaluator.ways and len(state.archive)):
         return
-    memory = state.gradients
-    if (count := rounds.due - rounds.restarts) > 0 and not (memory.unimodal.all() and convex_objectives(evaluator.nlp).all()):
-        solved, worse = restart_solves(state.archive, evaluator, settings.archive, count, rounds.restarts, memory.unimodal, state.rng)
-        memory.multimodal, rounds.restarts = memory.multimodal or worse, rounds.due
+    memory, m = state.gradients, state.archive.F.shape[1]
+    if (count := rounds.due - rounds.restarts) > 0 and not (alike(memory.starts, m) and convex_objectives(evaluator.nlp).all()):
+        open_ends = unsettled(memory.starts, m)
+        solved, starts = restart_solves(state.archive, evaluator, settings.archive, count, rounds.restarts, open_ends, state.rng)
+        memory.starts, rounds.restarts = np.vstack([memory.starts, starts]), rounds.due
         state.add_optima(Archive.of(solved, solved.status == CONVERGED))
         update_archives(state, [solved], settings, evaluator)
 
@@ -221,9 +258,9 @@ def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator,
         count = GRADIENT_RULES.polish_per_point * settings.archive
     solves = BudgetedSolves(evaluator, count, log, memory.failed_pairs, np.inf if rounds is None else WORK.search)
     # A later round is polished if it found something new: not all starts are alike.
-    unimodal = bool(memory.unimodal.all()) and memory.polished is None
+    same = memory.polished is None and alike(memory.starts, state.archive.F.shape[1])
     exponent = settings.variant.energy_exponent
-    state.archive = polish(log.archive, solves, settings.archive, exponent, guide, state.optima, unimodal)
+    state.archive = polish(log.archive, solves, settings.archive, exponent, guide, state.optima, same)
     if solves.stopped:
         return None
     memory.polishing, memory.polished, memory.failed_pairs = None, state.archive, solves.failed_pairs

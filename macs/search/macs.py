@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..front import Front
 from ..fronts.builders import best_rows
 from ..gradients.front_polish import polished
+from ..gradients.multistart import MultistartStopping
 from ..pareto import directions
 from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
@@ -30,7 +31,7 @@ from ..refinement.mending import mended
 from ..refinement.mesh_search import SearchMeshes
 from ..solvers.solver import Solver
 from .breeding import breed_archive, try_neighbours
-from .gradient_actions import Opening, begin_round, gradient_actions, polish_archive
+from .gradient_actions import Opening, begin_round, gradient_actions, polish_archive, unsettled
 from .guide import PreferenceGuide, check_preference, guide_of, written
 from .individual import individual_actions
 from .repair import repair
@@ -60,7 +61,14 @@ class MACS(Settings, Solver):
                 raise TypeError(unknown("setting of MACS", name, (one.name for one in fields(Settings))))
             super().__init__(*args, **settings)
 
-    def begin(self, evaluator: Evaluator, budget: int | None, rng: np.random.Generator, start: np.ndarray | None = None) -> SearchState:
+    def begin(
+        self,
+        evaluator: Evaluator,
+        budget: int | None,
+        rng: np.random.Generator,
+        start: np.ndarray | None = None,
+        rules: Mapping[int, MultistartStopping] | None = None,
+    ) -> SearchState:
         """The state of a search after its first population has been sampled, evaluated and archived.
 
         Parameters
@@ -74,6 +82,8 @@ class MACS(Settings, Solver):
         start : array (k, D), optional
             Full vectors that are evaluated first. If they are fewer than the points to sample, the rest is sampled; the best of all become
             agents.
+        rules : mapping, optional
+            What starts on another mesh found for each objective; the best of them are in `start`.
 
         Returns
         -------
@@ -89,7 +99,7 @@ class MACS(Settings, Solver):
         given = 0 if start is None else len(start)
         Z = self._first_vectors(evaluator, budget, rng, start)
         gradients = self.refines and evaluator.has_gradients
-        opening = Opening(evaluator, Z, given, gradients, self.archive if self.prefer is None else 0, budget, rng)
+        opening = Opening(evaluator, Z, given, gradients, self.archive if self.prefer is None else 0, budget, rng, rules or {})
         seen = opening.population.joined(opening.optima)
         m, d, none = seen.F.shape[1], len(evaluator.free), Archive.of(seen, np.arange(0))
         self.check_objectives(m)
@@ -113,7 +123,7 @@ class MACS(Settings, Solver):
             excess=0.0,
             inner=inner,
             spent=spent,
-            gradients=GradientMemory(0, opening.unimodal, opening.multimodal, 0),
+            gradients=GradientMemory(0, opening.starts, 0),
             rng=rng,
             evaluations=evaluator.counts.evaluations,
             rounds=Rounds.first(m, gradients, self.ceiling) if in_rounds else None,
@@ -180,7 +190,7 @@ class MACS(Settings, Solver):
             state.evaluations,
             evaluator.counts.work,
             gradients,
-            state.gradients.multimodal,
+            bool(unsettled(state.gradients.starts, len(state.directions[0]))),
             self.ceiling,
         )
         if len(state.archive):

@@ -30,10 +30,12 @@ class RoundLimits:
     first: int = 150  # evaluations of the first round, and least number of a later one, with gradients
     first_without: int = 2_000  # the same without
     growth: int = 4  # a later round has at least this part, one fourth, of all evaluations before it
-    restart: int = 6  # a later round begins with one gradient solve from another start for so many of its evaluations
-    patience: float = 2.0  # where optima are multimodal: least rounds without progress before the search ends,
+    # A later round begins with one gradient solve from another start for so many of its evaluations: where each end had starts enough, and
+    # where one had not.
+    restart: tuple[int, int] = (12, 6)
+    patience: float = 2.0  # then, and where a later round made progress: least rounds without progress before the search ends,
     again: float = 0.25  # as a part of the evaluations that the last progress took,
-    long: int = 8  # and least rounds that are enough even where they took less work than other starts may always take, `WORK.little`
+    long: int = 8  # and, where an end had not starts enough, either `WORK.little` of work or so many rounds
     beyond: float = 1e-3  # distance, in ranges of the front, that a point must lie beyond the front to count
     progress: float = 1e-3  # part by which the hypervolume must grow, or the best values of the directions on average, to be progress
     ends: float = 5e-3  # part of its range by which the best value of an objective must fall to be progress
@@ -87,11 +89,11 @@ def next_round(
     evaluations: int,
     work: int,
     gradients: bool,
-    multimodal: bool,
+    unsettled: bool,
     ceiling: int,
 ) -> Rounds:
     """The rounds after the end of one with new objectives (k, m) and feasible agents (a, m): with the next round, or the reason why none
-    follows."""
+    follows. `unsettled`: an end of the front has several optima, and had not starts enough."""
     shortest, little = (ROUND_LIMITS.first, WORK.little) if gradients else (ROUND_LIMITS.first_without, 0.0)
     seen = np.vstack([found, feasible])
     extent = np.fmax(rounds.extent, np.ptp(seen, axis=0)) if len(seen) else rounds.extent
@@ -105,15 +107,15 @@ def next_round(
         known = known[distinct(known, ranges(known))] if len(known) else known
         opened = rounds.opened or (evaluations if len(known) else 0)
         rounds = replace(rounds, improved=evaluations, work=work, opened=opened, front=known, violation=violation)
-    multimodal = multimodal or rounds.improved > rounds.opened
-    patience = max(ROUND_LIMITS.patience * shortest, ROUND_LIMITS.again * rounds.improved) if multimodal else shortest
+    several = unsettled or rounds.improved > rounds.opened
+    patience = max(ROUND_LIMITS.patience * shortest, ROUND_LIMITS.again * rounds.improved) if several else shortest
     fruitless = evaluations - rounds.improved
-    if fruitless >= patience and (not multimodal or work - rounds.work >= little or fruitless >= ROUND_LIMITS.long * shortest):
+    if fruitless >= patience and (not unsettled or work - rounds.work >= little or fruitless >= ROUND_LIMITS.long * shortest):
         return replace(rounds, stopped=DONE)
     if evaluations >= ceiling or (len(rounds.front) and work >= WORK.search):
         return replace(rounds, stopped=CEILING)
     end = min(evaluations + max(shortest, evaluations // ROUND_LIMITS.growth), ceiling)
-    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // ROUND_LIMITS.restart)
+    return replace(rounds, end=end, due=rounds.due + (end - evaluations) // ROUND_LIMITS.restart[unsettled])
 
 
 def improves(found: np.ndarray, front: np.ndarray, extent: np.ndarray, directions: np.ndarray) -> bool:

@@ -133,11 +133,12 @@ class ResidualSamples:
 class GradientMemory:
     """Results of gradient solves that later ones depend on."""
 
-    SHAPES: ClassVar[dict[str, str]] = {"unimodal": "m bool", "failed_pairs": "v 2m"}
+    SHAPES: ClassVar[dict[str, str]] = {"starts": "k 2", "failed_pairs": "v 2m"}
 
     solves: int  # of single agents
-    unimodal: np.ndarray  # (m,) bool: whether, at the beginning, solves for an objective from enough starts all ended in one optimum
-    multimodal: bool  # whether solves from different starts ended in different optima, then or when a round began
+    # (k, 2): Objectives that were minimised alone, each from another start, and the optima: NaN where a solve failed, -inf where no start
+    # finds another one.
+    starts: np.ndarray
     hopeless: int  # as long as nothing was feasible: candidates that the inner level left where the violation gets no smaller nearby
     polishing: PolishLog | None = None  # solves of a polish that has begun and is not finished
     polished: Archive | None = None  # what the last polish made

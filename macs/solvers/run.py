@@ -6,7 +6,7 @@ import hashlib
 import secrets
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,7 @@ class SearchRun:
     call: Call  # without a number of evaluations, the search goes on in rounds until it is done, see `SearchMethod.searches_until_done`
     start: np.ndarray | None  # (k, D): Full vectors to begin with
     what: Mapping[str, Any]  # problem, solver and settings as data: a checkpoint belongs to these and to the fields above
+    more: Mapping[str, Any] = field(default_factory=dict)  # further arguments of `solver.begin`, which follow from the problem
 
     def go(self) -> Front:
         """The front of the search, new or continued from its checkpoint, until the budget is spent or the search is stopped."""
@@ -75,7 +76,8 @@ class SearchRun:
         if self._state is None:
             self.evaluator.before_batch = self._show
             try:
-                self._state = self.solver.begin(self.evaluator, self.call.evaluations, np.random.default_rng(self._seed), self.start)
+                rng = np.random.default_rng(self._seed)
+                self._state = self.solver.begin(self.evaluator, self.call.evaluations, rng, self.start, **self.more)
             except Stopped as reason:  # while something was built that even the first evaluations need
                 return str(reason)
             self._keep()

@@ -139,9 +139,9 @@ class Solver(SearchMethod):
         After more than ten seconds, `stats["seconds"]` has what they were spent on: search, certificates, mending, simulation, explanation.
 
         Without a number of evaluations, MACS searches in rounds, each with a polish if there are gradients and something new was found. It
-        ends when further work did not improve the front: 150 evaluations (2000 without gradients); where starts led to different optima,
-        or a later round improved the front, twice as many, at least a quarter of those before the last improvement, and some seconds of
-        counted work. Later rounds begin with gradient solves from other starts. At its `ceiling` a search ends, too, and after half a
+        ends when further work did not improve the front: 150 evaluations (2000 without gradients); where a later round improved the
+        front, twice as many, and at least a quarter of those before the last improvement. Later rounds begin with gradient solves from
+        other starts. At its `ceiling` a search ends, too, and after half a
         minute or so of counted work on large programs; `stats["stopped"]` is "done" or "ceiling".
         Improved means: points that lie beyond the front by more than 0.001 of its ranges add 0.1 % to its hypervolume, or to the best
         values of all directions on average, or one objective gets better by 0.5 % of its range. That is no proof that nothing better
@@ -199,6 +199,8 @@ class Solver(SearchMethod):
                 # The rest of a limit is for simulations and re-solves: without them, nothing that was found can be trusted.
                 within = None if call.time_limit is None else max(0.75 * call.time_limit - interrupts.elapsed, 1e-3)
                 run = self._search_run(compiled, transcription, solver, level, start, replace(call, time_limit=within))
+                if chosen is not None and start is chosen.ends and chosen.rules:
+                    run.more = {"rules": chosen.rules}
             except Stopped as reason:
                 spent = {"wall_time": interrupts.elapsed, "seed": call.seed, "tolerance": call.tolerance}
                 stats = costs(earlier, **spent, stopped=str(reason), reproducible=False)

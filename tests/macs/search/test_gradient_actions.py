@@ -105,21 +105,21 @@ def test_where_the_way_is_chosen_solves_find_points_along_the_front(monkeypatch)
     effort = 12 / 3.0**3  # of the way in 3 seconds, on which the control is a straight line
     assert state.ideal[1] == pytest.approx(effort, rel=1e-4) and len(state.optima) >= 6
     assert state.ideal[0] == pytest.approx(2 / np.sqrt(5), rel=1e-2), "full thrust, then none: 2 sqrt(1 / 5)"
-    # Ends that were alike are not sought again where others were not; no other start finds a worse optimum.
-    assert state.gradients.unimodal.all() and not state.gradients.multimodal
-    rng, tasks, original = np.random.default_rng(1), [], MultistartSolver.from_vectors
-    found, worse = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, state.gradients.unimodal, rng)
-    assert not worse and len(found.F) >= 6
+    # Of three solves two are for ends that had not starts enough; no other start finds another optimum.
+    memory, tasks, original = state.gradients, [], MultistartSolver.from_vectors
+    assert gradient_actions.alike(memory.starts, 2) and not gradient_actions.unsettled(memory.starts, 2)
+    found, starts = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, (), np.random.default_rng(1))
+    assert len(found.F) >= 6 and gradient_actions.alike(np.vstack([memory.starts, starts]), 2)
 
     def noted(self, begun):
         tasks.extend(np.flatnonzero(task.weights).tolist() for _, task in begun)
         return original(self, begun)
 
     monkeypatch.setattr(MultistartSolver, "from_vectors", noted)
-    for alike, ends in (([True, True], [[0], [1], [0], [1]]), ([True, False], [[1]] * 4)):
+    for open_ends, kinds in (((), [[0], [0, 1], [0, 1], [1], [0, 1], [0, 1]]), ((1,), [[1], [1], [0, 1]] * 2)):
         tasks.clear()
-        gradient_actions.restart_solves(state.archive, evaluator, 6, 6, 0, np.array(alike), np.random.default_rng(1))
-        assert tasks == [*ends[:2], [0, 1], *ends[2:], [0, 1]], "two of three are ends"
+        gradient_actions.restart_solves(state.archive, evaluator, 6, 6, 0, open_ends, np.random.default_rng(1))
+        assert tasks == kinds
 
 
 def test_where_solves_for_feasibility_find_nothing_no_candidate_is_projected() -> None:
@@ -141,8 +141,10 @@ def test_what_nothing_makes_feasible_is_projected(monkeypatch) -> None:
     assert few.counts.evaluations == 13, "as far as the budget goes"
 
 
-def test_worse_optima_from_other_starts_are_noticed() -> None:
+def test_optima_that_other_starts_find_are_noticed() -> None:
     evaluator = projecting(load("landing_site", landers=1), DFET(1, 3))
     state = begun(evaluator, archive=6)
-    found, worse = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, state.gradients.unimodal, np.random.default_rng(1))
-    assert worse is True and len(found.F) >= 6
+    found, starts = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, (), np.random.default_rng(1))
+    assert len(starts) == 4 and len(found.F) >= 6
+    both = np.vstack([state.gradients.starts, starts])
+    assert gradient_actions.unsettled(both, 2) and not gradient_actions.alike(both, 2)

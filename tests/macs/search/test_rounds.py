@@ -34,8 +34,8 @@ EVERY = directions.pool(2, 100)
 FIRST = ROUND_LIMITS.first
 
 
-def after(known: Rounds, found: np.ndarray, evaluations: int, multimodal: bool = False, ceiling: int = 10**6, work: int = 0) -> Rounds:
-    return next_round(known, found, np.empty((0, 2)), np.inf, EVERY, evaluations, work, True, multimodal, ceiling)
+def after(known: Rounds, found: np.ndarray, evaluations: int, unsettled: bool = False, ceiling: int = 10**6, work: int = 0) -> Rounds:
+    return next_round(known, found, np.empty((0, 2)), np.inf, EVERY, evaluations, work, True, unsettled, ceiling)
 
 
 @settings(max_examples=50, deadline=None)
@@ -80,19 +80,19 @@ def test_it_ends_after_as_much_without_progress_as_is_stated_or_at_a_ceiling():
     first = after(Rounds.first(2, True, 10**6), QUARTER, FIRST)
     assert first.end == 2 * FIRST and first.improved == FIRST and not first.stopped
     assert after(first, QUARTER, 2 * FIRST).stopped == DONE
-    some = after(first, QUARTER, 2 * FIRST, multimodal=True)
+    some = after(first, QUARTER, 2 * FIRST, unsettled=True)
     assert not some.stopped and some.end == 3 * FIRST and some.due > first.due > 0
     late = after(first, QUARTER - 0.1, 2 * FIRST)
     assert late.improved == 2 * FIRST and not after(late, QUARTER - 0.1, 3 * FIRST).stopped, "a later round made progress"
     long = replace(late, improved=10_000)
     at = int(10_000 * (1 + ROUND_LIMITS.again))
     assert not after(long, QUARTER, at - 1, work=WORK.little).stopped and after(long, QUARTER, at, work=WORK.little).stopped == DONE
-    first = after(Rounds.first(2, True, 10**6), QUARTER, FIRST, multimodal=True, work=1000)
+    first = after(Rounds.first(2, True, 10**6), QUARTER, FIRST, unsettled=True, work=1000)
     at, enough = 3 * FIRST, 1000 + int(WORK.little)
-    assert first.work == 1000 and not after(first, QUARTER, at, multimodal=True, work=enough - 1).stopped
-    assert after(first, QUARTER, at, multimodal=True, work=enough).stopped == DONE
+    assert first.work == 1000 and not after(first, QUARTER, at, unsettled=True, work=enough - 1).stopped
+    assert after(first, QUARTER, at, unsettled=True, work=enough).stopped == DONE
     assert after(first, QUARTER, at, work=1000).stopped == DONE
-    assert after(first, QUARTER, (1 + ROUND_LIMITS.long) * FIRST, multimodal=True, work=enough - 1).stopped == DONE
+    assert after(first, QUARTER, (1 + ROUND_LIMITS.long) * FIRST, unsettled=True, work=enough - 1).stopped == DONE
     first = after(Rounds.first(2, True, FIRST + 50), QUARTER, FIRST, ceiling=FIRST + 50)
     assert first.end == FIRST + 50 and not first.stopped
     assert after(first, QUARTER - 0.1, FIRST + 50, ceiling=FIRST + 50).stopped == "ceiling"
