@@ -139,7 +139,7 @@ class Opening:
             found = lexicographic_ends(solver, lambda i: self._single(solver, i) if i else first, WORK.most)
             rows = [(i, loss) for i, one in solver.stopping.items() for loss in [*one.results, *[-np.inf] * one.convex]]
             self.starts = np.array(rows).reshape(-1, 2)
-            if alike(self.starts, len(found)):
+            if alike(self.starts, np.array([one.F for one in found])):
                 solver.most = 0  # nothing else is expected between the ends, either
             if 1 < len(found) == sum(one.status == CONVERGED for one in found):
                 F = np.array([one.F for one in found])
@@ -154,28 +154,31 @@ class Opening:
     def _single(solver: MultistartSolver, i: int) -> Solved:
         """The optimum of objective i, from other starts, too, if that known on another mesh leads to none."""
         solved = solver.single(i)
-        if solved.status != CONVERGED and solver.stopping.pop(i, None):
+        if solved.status != CONVERGED and i in solver.stopping:
+            del solver.stopping[i]
             solved = solver.single(i)
         return solved
 
 
-def _rules(starts: np.ndarray, m: int, better: float) -> list[MultistartStopping]:
-    """What starts (k, 2) say of each of m objectives; see `GradientMemory.starts`."""
-    rules = [MultistartStopping(better) for _ in range(m)]
+def _rules(starts: np.ndarray, F: np.ndarray, better: float) -> list[MultistartStopping]:
+    """What starts (k, 2), see `GradientMemory.starts`, say of each objective of a front (n, m)."""
+    rules = [MultistartStopping(better) for _ in range(F.shape[1])]
+    for rule, span in zip(rules, np.ptp(F, axis=0).tolist() if len(F) else [0.0] * len(rules), strict=True):
+        rule.accuracy = MULTISTART.same * span
     for i, loss in starts.tolist():
         rules[int(i)].convex |= loss == -np.inf
         rules[int(i)].add(loss)
     return rules
 
 
-def alike(starts: np.ndarray, m: int) -> bool:
+def alike(starts: np.ndarray, F: np.ndarray) -> bool:
     """Whether starts enough to begin with led to one optimum of each objective."""
-    return all(one.enough and one.converged and not one.several for one in _rules(starts, m, GRADIENT_RULES.better))
+    return all(one.enough and one.converged and not one.several for one in _rules(starts, F, GRADIENT_RULES.better))
 
 
-def unsettled(starts: np.ndarray, m: int) -> list[int]:
+def unsettled(starts: np.ndarray, F: np.ndarray) -> list[int]:
     """Objectives with several optima that had not starts enough."""
-    return [i for i, one in enumerate(_rules(starts, m, MULTISTART.better)) if one.several and not one.enough]
+    return [i for i, one in enumerate(_rules(starts, F, MULTISTART.better)) if one.several and not one.enough]
 
 
 def restart_solves(
@@ -213,9 +216,9 @@ def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) ->
     rounds = state.rounds if evaluator.has_gradients else None
     if rounds is None or not (settings.refines and isinstance(evaluator, Bilevel) and evaluator.ways and len(state.archive)):
         return
-    memory, m = state.gradients, state.archive.F.shape[1]
-    if (count := rounds.due - rounds.restarts) > 0 and not (alike(memory.starts, m) and convex_objectives(evaluator.nlp).all()):
-        open_ends = unsettled(memory.starts, m)
+    memory, F = state.gradients, state.archive.F
+    if (count := rounds.due - rounds.restarts) > 0 and not (alike(memory.starts, F) and convex_objectives(evaluator.nlp).all()):
+        open_ends = unsettled(memory.starts, F)
         solved, starts = restart_solves(state.archive, evaluator, settings.archive, count, rounds.restarts, open_ends, state.rng)
         memory.starts, rounds.restarts = np.vstack([memory.starts, starts]), rounds.due
         state.add_optima(Archive.of(solved, solved.status == CONVERGED))
@@ -258,7 +261,7 @@ def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator,
         count = GRADIENT_RULES.polish_per_point * settings.archive
     solves = BudgetedSolves(evaluator, count, log, memory.failed_pairs, np.inf if rounds is None else WORK.search)
     # A later round is polished if it found something new: not all starts are alike.
-    same = memory.polished is None and alike(memory.starts, state.archive.F.shape[1])
+    same = memory.polished is None and alike(memory.starts, state.archive.F)
     exponent = settings.variant.energy_exponent
     state.archive = polish(log.archive, solves, settings.archive, exponent, guide, state.optima, same)
     if solves.stopped:

@@ -190,7 +190,7 @@ class MACS(Settings, Solver):
             state.evaluations,
             evaluator.counts.work,
             gradients,
-            bool(unsettled(state.gradients.starts, len(state.directions[0]))),
+            bool(unsettled(state.gradients.starts, state.archive.F)),
             self.ceiling,
         )
         if len(state.archive):

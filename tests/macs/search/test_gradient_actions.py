@@ -107,9 +107,9 @@ def test_where_the_way_is_chosen_solves_find_points_along_the_front(monkeypatch)
     assert state.ideal[0] == pytest.approx(2 / np.sqrt(5), rel=1e-2), "full thrust, then none: 2 sqrt(1 / 5)"
     # Of three solves two are for ends that had not starts enough; no other start finds another optimum.
     memory, tasks, original = state.gradients, [], MultistartSolver.from_vectors
-    assert gradient_actions.alike(memory.starts, 2) and not gradient_actions.unsettled(memory.starts, 2)
+    assert gradient_actions.alike(memory.starts, state.archive.F) and not gradient_actions.unsettled(memory.starts, state.archive.F)
     found, starts = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, (), np.random.default_rng(1))
-    assert len(found.F) >= 6 and gradient_actions.alike(np.vstack([memory.starts, starts]), 2)
+    assert len(found.F) >= 6 and gradient_actions.alike(np.vstack([memory.starts, starts]), state.archive.F)
 
     def noted(self, begun):
         tasks.extend(np.flatnonzero(task.weights).tolist() for _, task in begun)
@@ -147,4 +147,4 @@ def test_optima_that_other_starts_find_are_noticed() -> None:
     found, starts = gradient_actions.restart_solves(state.archive, evaluator, 6, 12, 0, (), np.random.default_rng(1))
     assert len(starts) == 4 and len(found.F) >= 6
     both = np.vstack([state.gradients.starts, starts])
-    assert gradient_actions.unsettled(both, 2) and not gradient_actions.alike(both, 2)
+    assert gradient_actions.unsettled(both, state.archive.F) and not gradient_actions.alike(both, state.archive.F)
