@@ -279,7 +279,7 @@ class MACS(Algorithm):
         self.off = Population.create(*(one for batch in self._told for one in batch))
         self._state, self._told, self._asked, self._budget = state, [], None, None
         self._designs = evaluator.known_designs
-        if evaluator.exhausted:
+        if evaluator.over:
             self.termination.terminate()
         self._given = Population.empty()
         kept = [place(*row) for group in (state.archive, state.agents) for row in zip(group.Z, group.F, strict=True)]

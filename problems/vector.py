@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -23,6 +24,12 @@ from .compiled import Limit, Objective, Variable, kinds
 def without_dynamics(name: str) -> str:
     """The reason why a vector problem is refused where dynamics or derivatives are needed."""
     return f"'{name}' is a vector problem, which has no dynamics and no derivatives"
+
+
+def is_of_statement(error: BaseException) -> bool:
+    """Whether it was raised where what a function returned is checked, and not by that function."""
+    module = [*traceback.walk_tb(error.__traceback__)][-1][0].f_globals.get("__name__", "")
+    return module in (__name__, "macs.evaluation.blackbox")
 
 
 Outputs = Callable[[np.ndarray], Mapping[str, Any]]
@@ -68,6 +75,8 @@ class CompiledVectorProblem:
         Without `limits`: columns that have to be 0, instead of at most 0. With any, residuals are divided by the `sizes`.
     address, data
         As of `CompiledProblem`.
+    by_row : bool
+        Whether the function computes one row at a time.
 
     Examples
     --------
@@ -84,6 +93,7 @@ class CompiledVectorProblem:
     address: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)
     equalities: tuple[int, ...] = ()
+    by_row: bool = False
 
     def __repr__(self) -> str:
         variables, goals = (", ".join(one.name for one in group) for group in (self.variables, self.goals))
@@ -128,8 +138,31 @@ class CompiledVectorProblem:
 
     @cached_property
     def _sampled(self) -> tuple[np.ndarray, np.ndarray]:
-        """What `rows` returns at the `sample`."""
-        return self.rows(self.sample)
+        """What `rows` returns at the `sample`; NaN where it raises an error."""
+        tried = [self.attempt(row, self.rows) for row in self.sample]
+        shapes = [tuple(part.shape[1] for part in one) for one in tried if not isinstance(one, str)]
+        if not shapes and (not self.goals or self.limits is None):
+            raise ValueError(f"its function failed at all of {SAMPLED} designs; at the first: {tried[0]}")
+        known = shapes[0] if shapes else (len(self.goals), len(self.limits or ()))
+        none = tuple(np.full((1, count), np.nan) for count in known)
+        values, bounded = zip(*(none if isinstance(one, str) else one for one in tried), strict=True)
+        return np.vstack(values), np.vstack(bounded)
+
+    def attempt(self, row: np.ndarray, what: Rows, passing: tuple[type[Exception], ...] = ()) -> tuple[np.ndarray, np.ndarray] | str:
+        """What `what` returns for one row (d,), or the error that the user's function raised, but those `passing`. What a function of many
+        rows returned wrongly is an error of the statement."""
+        try:
+            return what(row[None].copy())
+        except passing:
+            raise
+        except Exception as error:
+            if not self.by_row and is_of_statement(error):
+                raise
+            return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+    def named(self, row: np.ndarray) -> str:
+        """A row (d,) in words: "height = 0.5, material = steel"."""
+        return ", ".join(f"{v.name} = {v.meant(value)}" for v, value in zip(self.variables, row.tolist(), strict=True))
 
     @cached_property
     def sizes(self) -> np.ndarray:
@@ -192,7 +225,8 @@ class VectorProblem:
         self._variables: dict[str, Variable] = {}
         self._objectives: dict[str, Objective] = {}
         self._constraints: dict[str, Limit] = {}
-        self._function: Outputs | None = None
+        self._function: Callable[..., Mapping[str, Any]] | None = None
+        self._by_row = False
 
     def __repr__(self) -> str:
         return f"VectorProblem('{self.name}', variables=[{', '.join(self._variables)}], objectives=[{', '.join(self._objectives)}])"
@@ -280,6 +314,16 @@ class VectorProblem:
         self._function = function
         return function
 
+    def row(self, function: Any) -> Any:
+        """Say what computes one design: a decorator, in place of `function`. Returns the function as it is.
+
+        It takes a dict with the value of each variable by its name: a float, an int, or what was chosen. It returns a dict with a number
+        for each objective and constraint; what else is in it is ignored. A design at which it raises an error, or returns NaN or None, is
+        a failed evaluation. With `workers=` designs are computed side by side.
+        """
+        self._function, self._by_row = self.function(function), True
+        return function
+
     def compile(self) -> CompiledVectorProblem:
         """Check the whole and turn it into plain data.
 
@@ -295,14 +339,17 @@ class VectorProblem:
             raise ValueError(f"{place} has no objective; add one with minimize or maximize")
         if self._function is None:
             raise ValueError(f"{place} has no function; give it one with @problem.function")
+        variables, names = tuple(self._variables.values()), (*self._objectives, *self._constraints)
+        function = ByRow(place, self._function, variables, names) if self._by_row else self._function
         return CompiledVectorProblem(
             name=self.name,
-            variables=tuple(self._variables.values()),
+            variables=variables,
             goals=tuple(self._objectives.values()),
             limits=tuple(self._constraints.values()),
-            rows=NamedRows(place, self._function, tuple(self._objectives), tuple(self._constraints)),
+            rows=NamedRows(place, function, tuple(self._objectives), tuple(self._constraints)),
             address=self.address,
             data=dict(self.data),
+            by_row=self._by_row,
         )
 
     def _objective(self, name: str, unit: str, sense: str, scale: float | None) -> None:
@@ -312,6 +359,30 @@ class VectorProblem:
     def _new_output(self, kind: str, name: Any) -> str:
         """Objectives and constraints share their names, which are the keys of what the function returns."""
         return checks.new_name(kind, name, (*self._objectives, *self._constraints), f"problem '{self.name}'")
+
+
+@dataclass(frozen=True)
+class ByRow:
+    """A function of one design, dict in and dict out, as one of rows (n, d)."""
+
+    place: str
+    function: Callable[[dict[str, Any]], Mapping[str, Any]]
+    variables: tuple[Variable, ...]
+    names: tuple[str, ...]
+
+    def __call__(self, X: np.ndarray) -> dict[str, list[Any]]:
+        found = []
+        for row in X.tolist():
+            one = self.function({v.name: v.meant(value) for v, value in zip(self.variables, row, strict=True)})
+            if not isinstance(one, Mapping):
+                words = ", ".join(self.names)
+                raise ValueError(
+                    f"{self.place}: its function must return a dict with a number for each of {words}, not {checks.shown(one)}"
+                )
+            if missing := [f"'{name}'" for name in self.names if name not in one]:
+                raise ValueError(f"{self.place}: its function did not return {', '.join(missing)}, only {', '.join(map(repr, one))}")
+            found.append(one)
+        return {name: [one[name] for one in found] for name in self.names}
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import logging
-import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,11 +11,13 @@ import numpy as np
 
 from problems.checks import check_text, choices, interval, shown, unknown, whole
 from problems.compiled import Objective, Variable
-from problems.vector import SAMPLED, CompiledVectorProblem, real_numbers
+from problems.vector import SAMPLED, CompiledVectorProblem, is_of_statement, real_numbers
 from transcription.stopping import Stopped
 from transcription.trajectories.limits import excess
 
 from ..io.interrupts import at_once
+from ..io.text import counted
+from ..io.workers import each
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
 
 log = logging.getLogger(__name__)
@@ -33,7 +33,7 @@ class BlackBox(Evaluator):
     centre of the box, which is counted. ValueError where the result of a function has the wrong type or shape; the message names it.
     """
 
-    def __init__(self, problem: CompiledVectorProblem, tolerance: float = 1e-6) -> None:
+    def __init__(self, problem: CompiledVectorProblem, tolerance: float = 1e-6, apart: bool = False) -> None:
         if not (isinstance(tolerance, int | float) and 0 <= tolerance < np.inf):
             raise ValueError(f"tolerance: must be a number >= 0, not {tolerance!r}")
         plain = problem.limits is None
@@ -45,6 +45,9 @@ class BlackBox(Evaluator):
         self.free = np.arange(len(problem.variables))
         self.set_kinds(problem.variables)
         self.known_designs: dict[bytes, np.ndarray] = {}
+        self.apart = apart or problem.by_row  # whether each row is evaluated by itself
+        self._columns = (len(problem.goals), len(problem.limits)) if problem.goals and problem.limits is not None else ()
+        self._why: list[str] = []  # of the last batch, why rows failed
         self.counts = Counts(evaluations=SAMPLED if self._equalities else 0)
 
     @property
@@ -80,9 +83,11 @@ class BlackBox(Evaluator):
         return np.array([*self.known_designs.values()]) if self.known_designs else np.empty((0, 0))
 
     @property
-    def exhausted(self) -> bool:
-        """See `Evaluator.exhausted`."""
-        return len(self.known_designs) >= self.box.designs
+    def over(self) -> str:
+        """See `Evaluator.over`."""
+        if len(self.known_designs) >= self.box.designs:
+            return "done"
+        return "failed" if 100 <= self.counts.evaluations == self.counts.failures[FAILED] else ""
 
     def knows(self, Z: np.ndarray) -> np.ndarray:
         """See `Evaluator.knows`."""
@@ -93,12 +98,31 @@ class BlackBox(Evaluator):
         return np.array(candidates, dtype=float)
 
     def _values(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See `CompiledVectorProblem.evaluate`. Ctrl-C that the function hears ends the search."""
+        """See `CompiledVectorProblem.evaluate`; of a batch in which an error was raised each row by itself, NaN where it is raised again.
+        Ctrl-C that the function hears ends the search."""
+        self._why = [""] * len(Z)
         try:
-            with at_once(), errors_located(self.problem, Z):
-                return self.problem.evaluate(Z)
+            with at_once():
+                if not self.apart:
+                    try:
+                        return self.problem.evaluate(Z)
+                    except Stopped:
+                        raise
+                    except Exception as error:
+                        if is_of_statement(error):
+                            raise
+                found = each(attempted, self.problem, [(row,) for row in Z])
         except KeyboardInterrupt:
             raise Stopped("interrupted") from None
+        self._why = [one if isinstance(one, str) else "" for one in found]
+        good = [one for one in found if not isinstance(one, str)]
+        if good:
+            self._columns = good[0][0].shape[1], good[0][1].shape[1]
+        elif not self._columns:
+            raise ValueError(f"the function failed at all of {counted(len(Z), 'design')}; {self._why[0]}, at {self.problem.named(Z[0])}")
+        none = tuple(np.full((1, count), np.nan) for count in self._columns)
+        F, residuals = zip(*(none if isinstance(one, str) else one for one in found), strict=True)
+        return np.vstack(F), np.vstack(residuals)
 
     def room(self, Z: np.ndarray, left: int) -> int:
         """See `Evaluator.room`."""
@@ -137,29 +161,16 @@ class BlackBox(Evaluator):
         violation = np.abs(residuals).max(axis=1, initial=0.0)
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))
         F[failed], violation[failed] = np.nan, np.inf
+        if failed.any() and not self.counts.first_failure:
+            i = int(np.argmax(failed))
+            self.counts.first_failure = f"{self._why[i] or 'a value is no finite number'}, at {self.problem.named(Z[i])}"
+            log.warning("an evaluation failed: %s", self.counts.first_failure)
         return Evaluation(Z=Z.copy(), F=F, violation=violation, status=self._status(violation), residuals=residuals), 0
 
 
-@contextmanager
-def errors_located(problem: CompiledVectorProblem, Z: np.ndarray) -> Iterator[None]:
-    """Within, a function is evaluated at rows Z (k, d) or those of the problem's `sample`. Where it raises an error, the first of these at
-    which it does so alone is logged."""
-    try:
-        yield
-    except Stopped:
-        raise
-    except Exception as error:
-        module = [*traceback.walk_tb(error.__traceback__)][-1][0].f_globals.get("__name__")
-        if module not in (__name__, CompiledVectorProblem.__module__):  # these check what it returned
-            where = f"at none of {len(Z)} rows alone, but at all together"
-            for row in (*Z, *problem.sample):
-                try:
-                    problem.rows(row[None].copy())
-                except Exception:
-                    where = "at " + ", ".join(f"{v.name} = {value!r}" for v, value in zip(problem.variables, row.tolist(), strict=True))
-                    break
-            log.error("the function raised %s %s", type(error).__name__, where)
-        raise
+def attempted(problem: CompiledVectorProblem, row: np.ndarray) -> tuple[np.ndarray, np.ndarray] | str:
+    """The evaluation of one row (d,), or why it failed."""
+    return problem.attempt(row, problem.evaluate, (Stopped,))
 
 
 SENSES = ("minimize", "maximize")
@@ -403,6 +414,12 @@ class Reevaluation:
     trajectory: Any = None
 
 
+def _again(problem: CompiledVectorProblem, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """One decision (d,) evaluated again; NaN where that fails."""
+    found = attempted(problem, z)
+    return tuple(np.full((1, len(some)), np.nan) for some in (problem.goals, problem.limits or ())) if isinstance(found, str) else found  # type: ignore[return-value]
+
+
 def evaluated_again(problem: CompiledVectorProblem, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[dict[str, float]]]:
     """Objectives (n, m), all minimised, largest violations (n,), and violations by name of decisions (n, d), those of bounds included.
 
@@ -410,7 +427,10 @@ def evaluated_again(problem: CompiledVectorProblem, Z: np.ndarray) -> tuple[np.n
     """
     if not len(Z):
         return np.empty((0, len(problem.goals))), np.empty(0), []
-    F, found = problem.evaluate(np.array(Z, dtype=float))
+    if problem.by_row:
+        F, found = (np.vstack(part) for part in zip(*each(_again, problem, [(z,) for z in np.array(Z, dtype=float)]), strict=True))
+    else:
+        F, found = problem.evaluate(np.array(Z, dtype=float))
     beyond = excess(np.asarray(Z, dtype=float)[:, None], problem.variables)
     limits = [f"g{k + 1}" for k in range(found.shape[1])] if problem.limits is None else [limit.name for limit in problem.limits]
     names = [*limits, *(f"bounds of {v.name}" for v in problem.variables)]

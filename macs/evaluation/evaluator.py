@@ -216,6 +216,7 @@ class Counts:
     gradient_work: int = 0  # part of the work that gradient solves took
     solved: int = 0  # gradient solves that converged, each by itself or all of a batch, and their iterations
     solved_iterations: int = 0
+    first_failure: str = ""  # of an evaluation of a vector problem: the error, and the design
 
     __repr__ = short_repr
 
@@ -234,7 +235,8 @@ class Counts:
 
     def joined(self, other: Counts) -> Counts:
         """The sums of these and other costs."""
-        return Counts(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
+        sums = {one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)}
+        return Counts(**(sums | {"first_failure": self.first_failure or other.first_failure}))
 
 
 class Evaluator(ABC):
@@ -300,9 +302,10 @@ class Evaluator(ABC):
         self.kinds = (whole, np.array([bool(v.choices) for v in variables])) if whole.any() else (None, None)
 
     @property
-    def exhausted(self) -> bool:
-        """Whether there is no other point to evaluate."""
-        return False
+    def over(self) -> str:
+        """Why a search makes no sense any more, a word of `run.ENDED`: "done" where there is no other point to evaluate, "failed" where all
+        evaluations did; else empty."""
+        return ""
 
     def knows(self, Z: np.ndarray) -> np.ndarray:
         """Which full vectors (k, D) were evaluated already, and are not evaluated again: (k,)."""

@@ -194,7 +194,7 @@ def from_vector_problem(
     why = (
         f"the nearest violates the constraints by {violation:.2g}"
         if np.isfinite(violation)
-        else "all of them failed, their values are not finite"
+        else f"all of them failed, the first: {stats.get('first_failure') or 'its values are not finite'}"
     )
     return of(archive, message=f"{_nothing(stats)}; {why}", closest=nearest)
 

@@ -136,7 +136,8 @@ COUNTED = ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "w
 
 def costs(counts: Counts, **about: Any) -> dict[str, Any]:
     """`stats` of a front from the counts of a run, with `about`: `wall_time`, `seed`, `tolerance` and more."""
-    return {**{key: getattr(counts, key) for key in COUNTED}, "failures": dict(counts.failures), **about}
+    first = {"first_failure": counts.first_failure} if counts.first_failure else {}
+    return {**{key: getattr(counts, key) for key in COUNTED}, "failures": dict(counts.failures), **first, **about}
 
 
 def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopped: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from transcription.base import Transcription
 from transcription.elements.dfet import DFET
 from transcription.trajectories.costates import hamiltonian_variation
 
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, FAILED
 from ..io.text import call, counted, duration, html_block, html_table, numbers, text_table
 from .point import Point
 from .points import Points
@@ -174,6 +174,8 @@ def footer(front: Points) -> list[str]:
     bad = int((front.status != CONVERGED).sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
+    if first := front.stats.get("first_failure"):
+        lines.append(f"{counted(front.stats['failures'].get(FAILED, 0), 'evaluation')} failed; the first: {first}.")
     if front.stats["fallbacks"]:
         lines.append(f"{counted(front.stats['fallbacks'], 'candidate')} went to IPOPT, because the fast inner level failed.")
     lines += [_by_inner_solver(name, **one) for name, one in front.stats.get("ways", {}).items() if one["evaluations"]]

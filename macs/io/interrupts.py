@@ -94,7 +94,7 @@ class Interrupts(AbstractContextManager["Interrupts"]):
 
 @contextmanager
 def at_once() -> Iterator[None]:
-    """Within, as in a function of the user's, which may wait for processes that died of it, the first Ctrl-C interrupts as usual."""
+    """A context, of a function of the user's, in which the first Ctrl-C interrupts as usual: it may wait for processes that died of it."""
     token = _AT_ONCE.set(True)
     try:
         yield

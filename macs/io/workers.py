@@ -126,7 +126,10 @@ class Helpers:
             stop.touch()
             for future in begun:
                 future.cancel()
-            wait(begun, timeout=1.0)
+            if wait(begun, timeout=1.0).not_done and not self._given and self._executor is not None:
+                self._executor.shutdown(wait=False, kill_workers=True)  # type: ignore[call-arg]
+                self._executor = None
+                self._taught.clear()
             raise
         finally:
             stop.unlink(missing_ok=True)

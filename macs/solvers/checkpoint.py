@@ -194,7 +194,7 @@ def keeps(solver: SearchMethod) -> bool:
 
 def _check_counts(status: RunStatus) -> None:
     """Raise ValueError for a number that no run can have."""
-    numbers = {f"counts.{name}": count for name, count in vars(status.counts).items() if name != "failures"}
+    numbers = {f"counts.{name}": count for name, count in vars(status.counts).items() if name not in ("failures", "first_failure")}
     failures = {f"counts.failures[{name!r}]": count for name, count in status.counts.failures.items()}
     for name, number in {"seed": status.seed, "idle": status.idle, "elapsed": status.elapsed, **numbers, **failures}.items():
         if isinstance(number, bool) or not isinstance(number, int | float) or not 0 <= number < math.inf:

@@ -24,7 +24,7 @@ from .start import Call
 
 IDLE_ITERATIONS = 100
 """Number of successive iterations without any evaluation after which a search ends."""
-ENDED = ("budget", "idle", "settled", "done", "ceiling")
+ENDED = ("budget", "idle", "settled", "done", "ceiling", "failed")
 """Values of `stats["stopped"]` for a run that ended without being stopped."""
 
 
@@ -104,17 +104,14 @@ class SearchRun:
         """Why the run has ended, after its last round; empty if another follows."""
         if self.call.evaluations is not None and self.evaluator.counts.evaluations >= self.call.evaluations:
             return "budget"
-        done = "done" if self.evaluator.exhausted else self.solver.ended(self._state)
-        return done or ("idle" if self._idle >= IDLE_ITERATIONS else "")
+        return self.evaluator.over or self.solver.ended(self._state) or ("idle" if self._idle >= IDLE_ITERATIONS else "")
 
     def _search_round(self) -> None:
         """Search up to the budget, or to the end of the current round."""
         self.evaluator.before_batch = self._show_and_check
         counts = self.evaluator.counts
         limit = self.solver.round_end(self._state) if self.call.evaluations is None else self.call.evaluations
-        while (
-            counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not (self.evaluator.exhausted or self.solver.ended(self._state))
-        ):
+        while counts.evaluations < limit and self._idle < IDLE_ITERATIONS and not (self.evaluator.over or self.solver.ended(self._state)):
             spent = counts.evaluations
             self.solver.advance(self._state, self.evaluator, limit)
             self._idle = self._idle + 1 if counts.evaluations == spent else 0

@@ -22,7 +22,7 @@ from transcription.smooth import Smooth
 from transcription.stopping import Stopped
 
 from ..evaluation.bilevel import Bilevel
-from ..evaluation.blackbox import BlackBox, errors_located, plain_problem
+from ..evaluation.blackbox import BlackBox, plain_problem
 from ..evaluation.evaluator import Counts
 from ..front import Front
 from ..fronts.builders import from_archive, from_vector_problem, no_points
@@ -259,6 +259,7 @@ class Solver(SearchMethod):
         tolerance: float = 1e-6,
         start: Any = None,
         time_limit: float | None = None,
+        workers: Workers | None = None,
         progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
@@ -281,9 +282,11 @@ class Solver(SearchMethod):
         names, units, senses : sequences of str, optional
             Names, units and senses ("minimize" or "maximize") of the objectives. Default: "f1", "f2", ..., no units, all minimised.
         integer : bool or sequence of str
-            Whether all variables, or those of these names, are whole numbers; of a pymoo Problem, beside its own. For choices: `solve`.
-        seed, start, time_limit, progress, callback, checkpoint
-            As for `solve`. A checkpoint knows only bounds and names of a function, so the caller must pass the same function again.
+            Whether all variables, or those of these names, are whole numbers. A pymoo Problem says so itself, by its `vtype` or `vars`;
+            choices have the places of its options as their values. For choices of your own state a `VectorProblem`.
+        seed, start, time_limit, workers, progress, callback, checkpoint
+            As for `solve`. With `workers`, also 1, the function gets one row at a time. A
+            checkpoint knows only bounds and names of a function, so the caller must pass the same function again.
 
         Returns
         -------
@@ -296,7 +299,7 @@ class Solver(SearchMethod):
         OSError
             If the checkpoint cannot be written; before any work.
         """
-        call = Call(self._budget(None, evaluations), seed, tolerance, time_limit, None, progress, callback, checkpoint)
+        call = Call(self._budget(None, evaluations), seed, tolerance, time_limit, workers, progress, callback, checkpoint)
         problem = plain_problem(function, bounds, constraints=constraints, names=names, units=units, senses=senses, integer=integer)
         what = {
             "bounds": {v.name: (v.lower, v.upper) for v in problem.variables},
@@ -325,17 +328,17 @@ class Solver(SearchMethod):
         if isinstance(drawn, Smooth):
             raise ValueError(f"start: {without_dynamics(problem.name)}, so there are no smooth profiles")
         self.check_vector(problem)
-        with errors_located(problem, problem.sample[:0]):
-            what = {"problem": {"name": problem.name, "fingerprint": problem.fingerprint}}
+        what = {"problem": {"name": problem.name, "fingerprint": problem.fingerprint}}
         front = self._search_vector(problem, None if drawn else start, call, what)
         try:
-            return Front.of(with_nearest(front)).verify(verify)
+            with processes(call.workers):
+                return Front.of(with_nearest(front)).verify(verify)
         except Exception as error:
             return _not_simulated(front, error)
 
     def _search_vector(self, problem: CompiledVectorProblem, start: Any, call: Call, what: dict[str, Any]) -> Front:
         """The front of a vector problem as a search leaves it; `what` says for its checkpoint which problem that is."""
-        box, about = BlackBox(problem, call.tolerance), self.about()
+        box, about = BlackBox(problem, call.tolerance, apart=call.workers is not None), self.about()
         if problem.goals:
             self.check_objectives(len(problem.goals))
             self.check_goals(problem.goals)
@@ -347,7 +350,8 @@ class Solver(SearchMethod):
             return Front.of(from_vector_problem(problem, state.archive, state.closest, box.goals, about, stats))
 
         first = None if start is None else decisions(start, problem.variables)
-        return SearchRun(self, box, make_front, call, first, {"solver": about, **what}).go()
+        with processes(call.workers):
+            return SearchRun(self, box, make_front, call, first, {"solver": about, **what}).go()
 
 
 def _or_ends(front: Front, chosen: SearchMeshes | None) -> Front:

@@ -185,15 +185,19 @@ def test_a_masked_value_is_a_failed_evaluation(as_list):
     assert np.isnan(result.F[1:]).all()
 
 
-def test_an_error_of_the_function_says_at_which_row(caplog):
+def test_an_error_of_the_function_is_a_failed_evaluation_that_says_at_which_row(caplog):
     def function(X):
         if (X[:, 0] > 0.8).any():
             raise ArithmeticError("too large")
         return two(X)
 
-    with pytest.raises(ArithmeticError, match="too large"):
-        boxed(function, {"height": (0, 1), "width": (0, 1)}).evaluate(np.array([[0.1, 0.2], [0.9, 0.3], [0.95, 0.4]]))
-    assert caplog.messages == ["the function raised ArithmeticError at height = 0.9, width = 0.3"]
+    box = boxed(function, {"height": (0, 1), "width": (0, 1)})
+    seen = box.evaluate(np.array([[0.1, 0.2], [0.9, 0.3], [0.95, 0.4]]))
+    assert seen.status.tolist() == ["converged", "failed", "failed"] and seen.F[0].tolist() == [0.1, 0.9]
+    assert box.counts.first_failure == "ArithmeticError: too large, at height = 0.9, width = 0.3"
+    assert caplog.messages == [f"an evaluation failed: {box.counts.first_failure}"]
+    with pytest.raises(ValueError, match="failed at all of 1 design; ArithmeticError: too large, at height = 0.9"):
+        boxed(function, {"height": (0, 1), "width": (0, 1)}).evaluate(np.array([[0.9, 0.3]]))
     with pytest.raises(ValueError, match="shape"):
         boxed(lambda X: X[:1], [(0, 1)]).evaluate(np.zeros((3, 1)))
     assert len(caplog.messages) == 1, "what it returned is no error of its own"
