@@ -26,6 +26,16 @@ def without_dynamics(name: str) -> str:
     return f"'{name}' is a vector problem, which has no dynamics and no derivatives"
 
 
+def filled(found: Sequence[Row], columns: Sequence[int], first: str) -> tuple[np.ndarray, np.ndarray]:
+    """Rows together, NaN where they failed; where all did, there must be known numbers of `columns`. The `first` in words."""
+    columns = next((tuple(part.shape[1] for part in one) for one in found if not isinstance(one, str)), columns)
+    if not columns:
+        raise ValueError(f"the function failed at all designs; {found[0]}, at {first}")
+    none = tuple(np.full((1, count), np.nan) for count in columns)
+    values, bounded = zip(*(none if isinstance(one, str) else one for one in found), strict=True)
+    return np.vstack(values), np.vstack(bounded)
+
+
 def is_of_statement(error: BaseException) -> bool:
     """Whether it was raised where what a function returned is checked, and not by that function."""
     module = [*traceback.walk_tb(error.__traceback__)][-1][0].f_globals.get("__name__", "")
@@ -36,6 +46,7 @@ Outputs = Callable[[np.ndarray], Mapping[str, Any]]
 Kind = TypeVar("Kind", bound=Outputs)
 SAMPLED = 8
 """Number of rows at which a function is evaluated to know it: few, since one may take long."""
+Row = tuple[np.ndarray, np.ndarray] | str  # what a function gives for one row, (1, m) and (1, c), or why it failed
 Rows = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 """`rows(X: (n, d)) -> (objectives (n, m) in the user's senses, values (n, c) that the limits bound)`."""
 
@@ -139,20 +150,13 @@ class CompiledVectorProblem:
     @cached_property
     def _sampled(self) -> tuple[np.ndarray, np.ndarray]:
         """What `rows` returns at the `sample`; NaN where it raises an error."""
-        tried = [self.attempt(row, self.rows) for row in self.sample]
-        shapes = [tuple(part.shape[1] for part in one) for one in tried if not isinstance(one, str)]
-        if not shapes and (not self.goals or self.limits is None):
-            raise ValueError(f"its function failed at all of {SAMPLED} designs; at the first: {tried[0]}")
-        known = shapes[0] if shapes else (len(self.goals), len(self.limits or ()))
-        none = tuple(np.full((1, count), np.nan) for count in known)
-        values, bounded = zip(*(none if isinstance(one, str) else one for one in tried), strict=True)
-        return np.vstack(values), np.vstack(bounded)
+        columns = (len(self.goals), len(self.limits)) if self.goals and self.limits is not None else ()
+        return filled([self.attempt(row, "rows") for row in self.sample], columns, self.named(self.sample[0]))
 
-    def attempt(self, row: np.ndarray, what: Rows, passing: tuple[type[Exception], ...] = ()) -> tuple[np.ndarray, np.ndarray] | str:
-        """What `what` returns for one row (d,), or the error that the user's function raised, but those `passing`. What a function of many
-        rows returned wrongly is an error of the statement."""
+    def attempt(self, row: np.ndarray, what: str, passing: tuple[type[Exception], ...] = ()) -> Row:
+        """What the method of this name returns for one row (d,), or the error that the user's function raised, but those `passing`."""
         try:
-            return what(row[None].copy())
+            return getattr(self, what)(row[None].copy())
         except passing:
             raise
         except Exception as error:
@@ -247,14 +251,7 @@ class VectorProblem:
         return MappingProxyType(self._constraints)
 
     def variable(
-        self,
-        name: str,
-        *,
-        bounds: Any = None,
-        unit: str = "",
-        period: float | None = None,
-        integer: bool = False,
-        choices: Sequence[Any] | None = None,
+        self, name: str, *, bounds: Any = None, unit: str = "", period: float | None = None, integer: bool = False, choices: Any = None
     ) -> None:
         """Add a decision variable within finite bounds; with a `period`, bounds are one period wide, and values wrap around.
 
@@ -267,9 +264,8 @@ class VectorProblem:
             if bounds is not None or period is not None or integer:
                 raise ValueError(f"{what} has choices, and so neither bounds nor a period")
             labels = checks.choices(choices, what)
-            self._variables[name] = Variable(
-                name, 0.0, len(labels) - 1.0, checks.unit(unit, what), len(labels) - 1.0, integer=True, choices=labels
-            )
+            last = len(labels) - 1.0
+            self._variables[name] = Variable(name, 0.0, last, checks.unit(unit, what), last, None, True, labels)
             return
         if bounds is None:
             raise ValueError(f"{what} has neither bounds nor choices")
@@ -340,7 +336,7 @@ class VectorProblem:
         if self._function is None:
             raise ValueError(f"{place} has no function; give it one with @problem.function")
         variables, names = tuple(self._variables.values()), (*self._objectives, *self._constraints)
-        function = ByRow(place, self._function, variables, names) if self._by_row else self._function
+        function = ByRow(self._function, variables, names) if self._by_row else self._function
         return CompiledVectorProblem(
             name=self.name,
             variables=variables,
@@ -365,24 +361,15 @@ class VectorProblem:
 class ByRow:
     """A function of one design, dict in and dict out, as one of rows (n, d)."""
 
-    place: str
     function: Callable[[dict[str, Any]], Mapping[str, Any]]
     variables: tuple[Variable, ...]
     names: tuple[str, ...]
 
-    def __call__(self, X: np.ndarray) -> dict[str, list[Any]]:
-        found = []
-        for row in X.tolist():
-            one = self.function({v.name: v.meant(value) for v, value in zip(self.variables, row, strict=True)})
-            if not isinstance(one, Mapping):
-                words = ", ".join(self.names)
-                raise ValueError(
-                    f"{self.place}: its function must return a dict with a number for each of {words}, not {checks.shown(one)}"
-                )
-            if missing := [f"'{name}'" for name in self.names if name not in one]:
-                raise ValueError(f"{self.place}: its function did not return {', '.join(missing)}, only {', '.join(map(repr, one))}")
-            found.append(one)
-        return {name: [one[name] for one in found] for name in self.names}
+    def __call__(self, X: np.ndarray) -> Any:
+        found = [self.function({v.name: v.meant(x) for v, x in zip(self.variables, row, strict=True)}) for row in X.tolist()]
+        if wrong := [one for one in found if not isinstance(one, Mapping)]:
+            return wrong[0]
+        return {name: [one[name] for one in found] for name in self.names if all(name in one for one in found)}
 
 
 @dataclass(frozen=True)

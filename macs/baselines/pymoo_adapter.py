@@ -183,7 +183,6 @@ class Baseline(PopulationSolver):
         from pymoo.config import Config
         from pymoo.core.evaluator import VoidEvaluator
         from pymoo.core.problem import Problem
-        from pymoo.core.repair import Repair
         from pymoo.termination.max_gen import MaximumGenerationTermination
 
         Config.warnings["not_compiled"] = False  # it would print
@@ -199,11 +198,10 @@ class Baseline(PopulationSolver):
         algorithm.random_state = rng
         if evaluator.box.whole is not None and hasattr(algorithm, "mating"):
 
-            class Settled(Repair):
-                def _do(self, problem: Any, X: np.ndarray, **more: Any) -> np.ndarray:
-                    return settled(evaluator.box, X, rng)
+            def repair(problem: Any, offspring: Any, **more: Any) -> Any:
+                return offspring.set("X", settled(evaluator.box, offspring.get("X"), rng)) if len(offspring) else offspring
 
-            algorithm.mating.repair = Settled()  # before duplicates are left out
+            algorithm.mating.repair = repair  # before duplicates are left out
         return algorithm
 
     def _individuals(self, points: Members, evaluator: Evaluator) -> Any:

@@ -11,12 +11,11 @@ import numpy as np
 
 from problems.checks import check_text, choices, interval, shown, unknown, whole
 from problems.compiled import Objective, Variable
-from problems.vector import SAMPLED, CompiledVectorProblem, is_of_statement, real_numbers
+from problems.vector import SAMPLED, CompiledVectorProblem, filled, is_of_statement, real_numbers
 from transcription.stopping import Stopped
 from transcription.trajectories.limits import excess
 
 from ..io.interrupts import at_once
-from ..io.text import counted
 from ..io.workers import each
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
 
@@ -43,11 +42,12 @@ class BlackBox(Evaluator):
         self.lower, self.upper = (np.array([getattr(v, side) for v in problem.variables]) for side in ("lower", "upper"))
         self.period = np.array([v.period or 0.0 for v in problem.variables])
         self.free = np.arange(len(problem.variables))
-        self.set_kinds(problem.variables)
+        whole = np.array([v.integer for v in problem.variables], dtype=bool)
+        self.kinds = (whole, np.array([bool(v.choices) for v in problem.variables])) if whole.any() else (None, None)
         self.known_designs: dict[bytes, np.ndarray] = {}
         self.apart = apart or problem.by_row  # whether each row is evaluated by itself
-        self._columns = (len(problem.goals), len(problem.limits)) if problem.goals and problem.limits is not None else ()
-        self._why: list[str] = []  # of the last batch, why rows failed
+        self._columns: Sequence[int] = (len(problem.goals), len(problem.limits)) if problem.goals and problem.limits is not None else ()
+        self._why: dict[int, str] = {}  # of the last batch, why rows failed
         self.counts = Counts(evaluations=SAMPLED if self._equalities else 0)
 
     @property
@@ -70,7 +70,7 @@ class BlackBox(Evaluator):
 
     def resume(self, counts: Counts, m: int, memory: np.ndarray) -> None:
         """See `Evaluator.resume`. Raises ValueError if the function has another number of objectives."""
-        super().resume(counts, m, memory)
+        super().resume(replace(counts, failing=0), m, memory)
         self.m_known = learned(self.m_known, m, f"the checkpoint has {m}")
         d = len(self.free)
         if memory.dtype != float or (len(memory) and memory.shape[1:2] < (d + m + 1,)):
@@ -87,7 +87,7 @@ class BlackBox(Evaluator):
         """See `Evaluator.over`."""
         if len(self.known_designs) >= self.box.designs:
             return "done"
-        return "failed" if 100 <= self.counts.evaluations == self.counts.failures[FAILED] else ""
+        return "failed" if self.counts.failing >= 100 else ""
 
     def knows(self, Z: np.ndarray) -> np.ndarray:
         """See `Evaluator.knows`."""
@@ -100,29 +100,21 @@ class BlackBox(Evaluator):
     def _values(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `CompiledVectorProblem.evaluate`; of a batch in which an error was raised each row by itself, NaN where it is raised again.
         Ctrl-C that the function hears ends the search."""
-        self._why = [""] * len(Z)
         try:
             with at_once():
-                if not self.apart:
-                    try:
-                        return self.problem.evaluate(Z)
-                    except Stopped:
+                try:
+                    found: list[Any] = [] if self.apart else [self.problem.evaluate(Z)]
+                except Exception as error:
+                    if isinstance(error, Stopped) or is_of_statement(error):
                         raise
-                    except Exception as error:
-                        if is_of_statement(error):
-                            raise
-                found = each(attempted, self.problem, [(row,) for row in Z])
+                    found = []
+                found = found or each(CompiledVectorProblem.attempt, self.problem, [(row, "evaluate", (Stopped,)) for row in Z])
         except KeyboardInterrupt:
             raise Stopped("interrupted") from None
-        self._why = [one if isinstance(one, str) else "" for one in found]
-        good = [one for one in found if not isinstance(one, str)]
-        if good:
-            self._columns = good[0][0].shape[1], good[0][1].shape[1]
-        elif not self._columns:
-            raise ValueError(f"the function failed at all of {counted(len(Z), 'design')}; {self._why[0]}, at {self.problem.named(Z[0])}")
-        none = tuple(np.full((1, count), np.nan) for count in self._columns)
-        F, residuals = zip(*(none if isinstance(one, str) else one for one in found), strict=True)
-        return np.vstack(F), np.vstack(residuals)
+        self._why = {i: one for i, one in enumerate(found) if isinstance(one, str)}
+        F, residuals = filled(found, self._columns, self.problem.named(Z[0]))
+        self._columns = F.shape[1], residuals.shape[1]
+        return F, residuals
 
     def room(self, Z: np.ndarray, left: int) -> int:
         """See `Evaluator.room`."""
@@ -161,16 +153,12 @@ class BlackBox(Evaluator):
         violation = np.abs(residuals).max(axis=1, initial=0.0)
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))
         F[failed], violation[failed] = np.nan, np.inf
+        self.counts.failing = self.counts.failing + len(failed) if failed.all() else int(np.argmin(failed[::-1]))
         if failed.any() and not self.counts.first_failure:
             i = int(np.argmax(failed))
-            self.counts.first_failure = f"{self._why[i] or 'a value is no finite number'}, at {self.problem.named(Z[i])}"
+            self.counts.first_failure = f"{self._why.get(i, 'a value is no finite number')}, at {self.problem.named(Z[i])}"
             log.warning("an evaluation failed: %s", self.counts.first_failure)
         return Evaluation(Z=Z.copy(), F=F, violation=violation, status=self._status(violation), residuals=residuals), 0
-
-
-def attempted(problem: CompiledVectorProblem, row: np.ndarray) -> tuple[np.ndarray, np.ndarray] | str:
-    """The evaluation of one row (d,), or why it failed."""
-    return problem.attempt(row, problem.evaluate, (Stopped,))
 
 
 SENSES = ("minimize", "maximize")
@@ -414,12 +402,6 @@ class Reevaluation:
     trajectory: Any = None
 
 
-def _again(problem: CompiledVectorProblem, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """One decision (d,) evaluated again; NaN where that fails."""
-    found = attempted(problem, z)
-    return tuple(np.full((1, len(some)), np.nan) for some in (problem.goals, problem.limits or ())) if isinstance(found, str) else found  # type: ignore[return-value]
-
-
 def evaluated_again(problem: CompiledVectorProblem, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[dict[str, float]]]:
     """Objectives (n, m), all minimised, largest violations (n,), and violations by name of decisions (n, d), those of bounds included.
 
@@ -427,10 +409,7 @@ def evaluated_again(problem: CompiledVectorProblem, Z: np.ndarray) -> tuple[np.n
     """
     if not len(Z):
         return np.empty((0, len(problem.goals))), np.empty(0), []
-    if problem.by_row:
-        F, found = (np.vstack(part) for part in zip(*each(_again, problem, [(z,) for z in np.array(Z, dtype=float)]), strict=True))
-    else:
-        F, found = problem.evaluate(np.array(Z, dtype=float))
+    F, found = BlackBox(problem)._values(np.array(Z, dtype=float))
     beyond = excess(np.asarray(Z, dtype=float)[:, None], problem.variables)
     limits = [f"g{k + 1}" for k in range(found.shape[1])] if problem.limits is None else [limit.name for limit in problem.limits]
     names = [*limits, *(f"bounds of {v.name}" for v in problem.variables)]

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from problems.checks import short_repr
-from problems.compiled import Objective, Variable
+from problems.compiled import Objective
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 from ..io.text import counted
@@ -216,6 +216,7 @@ class Counts:
     gradient_work: int = 0  # part of the work that gradient solves took
     solved: int = 0  # gradient solves that converged, each by itself or all of a batch, and their iterations
     solved_iterations: int = 0
+    failing: int = 0  # evaluations that failed since the last one that did not
     first_failure: str = ""  # of an evaluation of a vector problem: the error, and the design
 
     __repr__ = short_repr
@@ -296,15 +297,9 @@ class Evaluator(ABC):
         """Box of the free variables."""
         return UnitBox(self.lower, self.upper, self.period > 0.0, *self.kinds)
 
-    def set_kinds(self, variables: Sequence[Variable]) -> None:
-        """Set `kinds` by the free variables."""
-        whole = np.array([v.integer for v in variables], dtype=bool)
-        self.kinds = (whole, np.array([bool(v.choices) for v in variables])) if whole.any() else (None, None)
-
     @property
     def over(self) -> str:
-        """Why a search makes no sense any more, a word of `run.ENDED`: "done" where there is no other point to evaluate, "failed" where all
-        evaluations did; else empty."""
+        """Why a search ends: "done" where there is no other point to evaluate, "failed" where a hundred evaluations did; else empty."""
         return ""
 
     def knows(self, Z: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from .start import Call
 
 IDLE_ITERATIONS = 100
 """Number of successive iterations without any evaluation after which a search ends."""
-ENDED = ("budget", "idle", "settled", "done", "ceiling", "failed")
+ENDED = ("budget", "idle", "settled", "done", "ceiling")
 """Values of `stats["stopped"]` for a run that ended without being stopped."""
 
 

@@ -282,8 +282,7 @@ class Solver(SearchMethod):
         names, units, senses : sequences of str, optional
             Names, units and senses ("minimize" or "maximize") of the objectives. Default: "f1", "f2", ..., no units, all minimised.
         integer : bool or sequence of str
-            Whether all variables, or those of these names, are whole numbers. A pymoo Problem says so itself, by its `vtype` or `vars`;
-            choices have the places of its options as their values. For choices of your own state a `VectorProblem`.
+            Whether all variables, or those of these names, are whole numbers; of a pymoo Problem, beside its own. For choices: `solve`.
         seed, start, time_limit, workers, progress, callback, checkpoint
             As for `solve`. With `workers`, also 1, the function gets one row at a time. A
             checkpoint knows only bounds and names of a function, so the caller must pass the same function again.
