@@ -48,6 +48,7 @@ class BlackBox(Evaluator):
         self.apart = apart or problem.by_row  # whether each row is evaluated by itself
         self._columns: Sequence[int] = (len(problem.goals), len(problem.limits)) if problem.goals and problem.limits is not None else ()
         self._why: dict[int, str] = {}  # of the last batch, why rows failed
+        self._failing = 0  # evaluations that failed since the last one that did not
         self.counts = Counts(evaluations=SAMPLED if self._equalities else 0)
 
     @property
@@ -70,7 +71,7 @@ class BlackBox(Evaluator):
 
     def resume(self, counts: Counts, m: int, memory: np.ndarray) -> None:
         """See `Evaluator.resume`. Raises ValueError if the function has another number of objectives."""
-        super().resume(replace(counts, failing=0), m, memory)
+        super().resume(counts, m, memory)
         self.m_known = learned(self.m_known, m, f"the checkpoint has {m}")
         d = len(self.free)
         if memory.dtype != float or (len(memory) and memory.shape[1:2] < (d + m + 1,)):
@@ -87,7 +88,7 @@ class BlackBox(Evaluator):
         """See `Evaluator.over`."""
         if len(self.known_designs) >= self.box.designs:
             return "done"
-        return "failed" if self.counts.failing >= 100 else ""
+        return "failed" if self._failing >= 100 else ""
 
     def knows(self, Z: np.ndarray) -> np.ndarray:
         """See `Evaluator.knows`."""
@@ -153,7 +154,7 @@ class BlackBox(Evaluator):
         violation = np.abs(residuals).max(axis=1, initial=0.0)
         failed = ~(np.isfinite(F).all(axis=1) & np.isfinite(violation))
         F[failed], violation[failed] = np.nan, np.inf
-        self.counts.failing = self.counts.failing + len(failed) if failed.all() else int(np.argmin(failed[::-1]))
+        self._failing = self._failing + len(failed) if failed.all() else int(np.argmin(failed[::-1]))
         if failed.any() and not self.counts.first_failure:
             i = int(np.argmax(failed))
             self.counts.first_failure = f"{self._why.get(i, 'a value is no finite number')}, at {self.problem.named(Z[i])}"

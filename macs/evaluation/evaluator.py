@@ -216,7 +216,6 @@ class Counts:
     gradient_work: int = 0  # part of the work that gradient solves took
     solved: int = 0  # gradient solves that converged, each by itself or all of a batch, and their iterations
     solved_iterations: int = 0
-    failing: int = 0  # evaluations that failed since the last one that did not
     first_failure: str = ""  # of an evaluation of a vector problem: the error, and the design
 
     __repr__ = short_repr

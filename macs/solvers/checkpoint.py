@@ -58,7 +58,7 @@ class RunStatus:
     idle: int  # number of iterations since the last evaluation
     elapsed: float  # seconds of work so far
     stopped: str = ""  # why the run ended by itself; empty as long as it has not
-    memory: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))  # see `Evaluator.memory`
+    memory: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)  # see `Evaluator.memory`
 
 
 @dataclass(frozen=True)
