@@ -224,8 +224,8 @@ def test_without_feasible_points_the_message_has_the_nearest(settings: Any, what
         seen.extend(G[:, 0])
         return schaffer(X) if what == "infeasible" else np.full((len(X), 2), np.nan), G
 
-    front = settings.minimize(function, CUBE, evaluations=120, seed=3)
-    assert len(front) == 0 and front.message.startswith("no feasible point in 120 evaluations") and front.closest is not None
+    front = settings.minimize(function, CUBE, evaluations=96, seed=3)
+    assert len(front) == 0 and front.message.startswith("no feasible point in 96 evaluations") and front.closest is not None
     if what == "infeasible":
         assert front.closest.violation == min(seen)
         if settings.handling == "feasible-first":
