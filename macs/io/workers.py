@@ -55,16 +55,16 @@ def cores() -> int:
 
 
 @contextmanager
-def processes(workers: Workers | None) -> Iterator[None]:
+def processes(workers: Workers | None) -> Iterator[Helpers | None]:
     """Within, independent pieces of work are done by so many processes, "all" for one for each core, or by an executor; None: as around."""
     if workers is None:
-        yield
+        yield _HELPERS.get()
         return
     check_workers(workers)
     count = cores() if isinstance(workers, str) else workers
     token = _HELPERS.set(None if count == 1 else _own(count) if isinstance(count, int) else Helpers(0, count))
     try:
-        yield
+        yield _HELPERS.get()
     finally:
         _HELPERS.reset(token)
 
@@ -87,6 +87,7 @@ class Helpers:
     def __init__(self, count: int, executor: Executor | None = None) -> None:
         self._count, self._executor, self._given = count, executor, executor is not None
         self._seconds, self._killed = 0.0, 0
+        self.batches: list[int] = []  # pieces of each batch so far
         self._taught: dict[str, list[Future[Any]]] = {}
         self._awake: Future[Any] | None = None  # done once there is a process
 
@@ -94,10 +95,12 @@ class Helpers:
         """See `each` beside this class, of a piece that has to be done before others: here, while processes begin that these will need."""
         if self._awake is None and self._worth and not self._given:
             self._awake = self._submit(os.getpid)
+        self.batches.append(1)
         return [self._here(do, shared, piece).result() for piece in pieces]
 
     def each(self, do: Callable[..., Result], shared: Any, pieces: Sequence[tuple[Any, ...]]) -> list[Result]:
         """See `each` beside this class."""
+        self.batches.append(len(pieces))
         found, left, begun = dict[int, Future[Any]](), deque(range(len(pieces))), dict[Future[Any], int]()
         data = self._packed(do, shared) if self._worth else b""
         digest, stop = hashlib.sha256(data).hexdigest(), Path(tempfile.gettempdir()) / f"macs-{uuid.uuid4().hex}"

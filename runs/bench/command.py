@@ -24,6 +24,7 @@ from .peers import PEERS
 from .published import METHODS, STANDARD, WILD
 from .searches import FRONT, SEARCH
 from .study import STUDY
+from .workers import WORKERS
 
 BENCHES: dict[str, Bench] = {
     **CONTESTS,
@@ -40,6 +41,7 @@ BENCHES: dict[str, Bench] = {
     "standard": STANDARD,
     "study": STUDY,
     "wild": WILD,
+    "workers": WORKERS,
 }
 
 

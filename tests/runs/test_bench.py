@@ -14,7 +14,7 @@ import pytest
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems.cases.standard import published
-from runs.bench import BENCHES, corpus, growth, header_of, inner, peers, searches, study
+from runs.bench import BENCHES, corpus, growth, header_of, inner, peers, searches, study, workers
 from runs.bench import published as optima
 from runs.bench.contract import Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
 from runs.cli import main
@@ -226,6 +226,8 @@ MET_AND_MISSED = [
     ("study", study_rows(1.69, 0.05), 1),
     ("study", study_rows(1.7, 0.051), 1),
     ("wild", verdict_rows(*["right"] * 8, optima.WRONG), 2),
+    ("workers", [Row("sweep of the cart-pole", workers.TWO, {"speed": times(1.6)}), Row(workers.ASLEEP, "", {"part": times(0.45)})], 0),
+    ("workers", [Row("sweep of the cart-pole", workers.TWO, {"speed": times(1.59)}), Row(workers.ASLEEP, "", {"part": times(0.46)})], 2),
 ]
 """Rows, and how many targets they miss."""
 

@@ -1,0 +1,105 @@
+"""Benchmark of `workers=`: one call on two processes against one, and the rounds of work that it needs on more."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from macs import MACS, Front, payoff, sweep
+from macs.io.console import Steps
+from macs.io.workers import each, processes
+
+from .contract import ASKED, Bench, Effort, Row, Target, column, rounds_of, side_by_side
+from .searches import cart_pole
+
+ONE, TWO = "one process", "two processes"
+CORES = (1, 2, 4, 16)
+ASLEEP = "32 equal tasks"
+
+
+@dataclass(frozen=True)
+class WorkersCase:
+    """A call, and how many times as fast it is to be with two processes."""
+
+    name: str
+    call: Callable[[], Front]
+    asked: float
+
+
+def measured_calls(case: WorkersCase | str, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
+    """Each round makes the call with one process and with two; of equal tasks, in which threads only wait, with 4 and 16."""
+
+    def measured(number: int) -> Iterable[Row]:
+        if isinstance(case, str):
+            seconds = {count: waited(count) for count in CORES[2:]}
+            yield Row.once(case, "16 against 4", part=seconds[16] / seconds[4])
+            return
+        timed = side_by_side({ONE: partial(made, case, 1), TWO: partial(made, case, 2)}, number)
+        if not np.array_equal(timed[ONE][1][0], timed[TWO][1][0]):
+            raise RuntimeError(f"{case.name}: two processes lead to another front than one")
+        batches = np.array(timed[TWO][1][1])
+        rounds = {f"on {count}": float(np.ceil(batches / count).sum()) for count in CORES}
+        for who, (seconds, _) in timed.items():
+            yield Row.once(case.name, who, seconds=seconds, speed=timed[ONE][0] / seconds, **rounds)
+
+    return measured
+
+
+def made(case: WorkersCase, count: int) -> tuple[np.ndarray, list[int]]:
+    """The objectives that a call finds, and the sizes of the batches into which it cuts its work."""
+    with processes(count) as helpers:
+        before = len(helpers.batches) if helpers else 0
+        front = case.call()
+        return front.F, helpers.batches[before:] if helpers else []
+
+
+def waited(count: int) -> float:
+    """Seconds of equal tasks in which so many threads only wait."""
+    with ThreadPoolExecutor(count) as threads, processes(threads):
+        began = time.perf_counter()
+        each(lambda seconds, _: time.sleep(seconds), 0.05, [(k,) for k in range(32)])
+        return time.perf_counter() - began
+
+
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """Two processes are faster than one by what each case asks."""
+    asked = {case.name: case.asked for case in WORKERS.full.cases if isinstance(case, WorkersCase)}
+    found = [
+        Target(row.case, f"at least {asked[row.case]:g} times as fast", row.short("speed"), row.of("speed") >= asked[row.case])
+        for row in rows
+        if row.who == TWO
+    ]
+    equal = [row for row in rows if row.case == ASLEEP]
+    return found + [Target(row.case, f"at most {ASKED['16']:g}", row.short("part"), row.of("part") <= ASKED["16"]) for row in equal]
+
+
+WORKERS = Bench(
+    title="workers",
+    about="WORKERS: one call with workers=2 against workers=1, in turn, wall time; median, least and greatest of few rounds. The first "
+    "round begins the processes. Rounds on 1, 2, 4 and 16: how often that many processes would begin a piece of work at the same "
+    "time, from the sizes of the batches into which the call cuts its work, whatever number there are.",
+    full=Effort(
+        (
+            WorkersCase("payoff of the cart-pole", partial(payoff, cart_pole(), "dfet:10x5", seed=1), 1.6),
+            WorkersCase("sweep of the cart-pole", partial(sweep, cart_pole(), "dfet:10x5", points=10, seed=1), 1.6),
+            WorkersCase("MACS of the cart-pole", lambda: MACS().solve(cart_pole(), seed=1), 1.4),
+            ASLEEP,
+        ),
+        rounds=3,
+    ),
+    quick=Effort((ASLEEP,)),
+    prepare=measured_calls,
+    columns=(
+        ("times as", "fast", lambda row: row.spread("speed") if row.who == TWO else ""),
+        *(column("rounds", f"on {count}", f"on {count}") for count in CORES),
+        column("time of 16", "in that of 4", "part", form=".2f"),
+        column("s", "", "seconds"),
+        rounds_of("seconds"),
+    ),
+    targets=targets,
+)
