@@ -13,12 +13,12 @@ import numpy as np
 from macs import MACS, Front, payoff, sweep
 from macs.io.console import Steps
 from macs.io.workers import each, processes
+from transcription import DFET
 
-from .contract import ASKED, Bench, Effort, Row, Target, column, rounds_of, side_by_side
+from .contract import ASKED, Bench, Column, Effort, Row, Target, column, rounds_of, side_by_side
 from .searches import cart_pole
 
 ONE, TWO = "one process", "two processes"
-CORES = (1, 2, 4, 16)
 ASLEEP = "32 equal tasks"
 
 
@@ -36,14 +36,13 @@ def measured_calls(case: WorkersCase | str, effort: Effort, steps: Steps) -> Cal
 
     def measured(number: int) -> Iterable[Row]:
         if isinstance(case, str):
-            seconds = {count: waited(count) for count in CORES[2:]}
-            yield Row.once(case, "16 against 4", part=seconds[16] / seconds[4])
+            yield Row.once(case, "16 against 4", part=waited(16) / waited(4))
             return
         timed = side_by_side({ONE: partial(made, case, 1), TWO: partial(made, case, 2)}, number)
         if not np.array_equal(timed[ONE][1][0], timed[TWO][1][0]):
             raise RuntimeError(f"{case.name}: two processes lead to another front than one")
         batches = np.array(timed[TWO][1][1])
-        rounds = {f"on {count}": float(np.ceil(batches / count).sum()) for count in CORES}
+        rounds = {f"on {count}": float(np.ceil(batches / count).sum()) for count in (1, 2, 4, 16)}
         for who, (seconds, _) in timed.items():
             yield Row.once(case.name, who, seconds=seconds, speed=timed[ONE][0] / seconds, **rounds)
 
@@ -78,6 +77,18 @@ def targets(rows: Sequence[Row]) -> list[Target]:
     return found + [Target(row.case, f"at most {ASKED['16']:g}", row.short("part"), row.of("part") <= ASKED["16"]) for row in equal]
 
 
+def columns(rows: Sequence[Row]) -> list[Column]:
+    """Those of the table, with one for each number of processes for which rounds were counted."""
+    counts = dict.fromkeys(name for row in rows for name in row.values if name.startswith("on "))
+    return [
+        ("times as", "fast", lambda row: row.spread("speed") if row.who == TWO else ""),
+        *(column("rounds", name, name) for name in counts),
+        column("time of 16", "in that of 4", "part", form=".2f"),
+        column("s", "", "seconds"),
+        rounds_of("seconds"),
+    ]
+
+
 WORKERS = Bench(
     title="workers",
     about="WORKERS: one call with workers=2 against workers=1, in turn, wall time; median, least and greatest of few rounds. The first "
@@ -85,8 +96,8 @@ WORKERS = Bench(
     "time, from the sizes of the batches into which the call cuts its work, whatever number there are.",
     full=Effort(
         (
-            WorkersCase("payoff of the cart-pole", partial(payoff, cart_pole(), "dfet:10x5", seed=1), 1.6),
-            WorkersCase("sweep of the cart-pole", partial(sweep, cart_pole(), "dfet:10x5", points=10, seed=1), 1.6),
+            WorkersCase("payoff of the cart-pole", partial(payoff, cart_pole(), DFET(10, 5), seed=1), 1.6),
+            WorkersCase("sweep of the cart-pole", partial(sweep, cart_pole(), DFET(10, 5), points=10, seed=1), 1.6),
             WorkersCase("MACS of the cart-pole", lambda: MACS().solve(cart_pole(), seed=1), 1.4),
             ASLEEP,
         ),
@@ -94,12 +105,6 @@ WORKERS = Bench(
     ),
     quick=Effort((ASLEEP,)),
     prepare=measured_calls,
-    columns=(
-        ("times as", "fast", lambda row: row.spread("speed") if row.who == TWO else ""),
-        *(column("rounds", f"on {count}", f"on {count}") for count in CORES),
-        column("time of 16", "in that of 4", "part", form=".2f"),
-        column("s", "", "seconds"),
-        rounds_of("seconds"),
-    ),
+    columns=columns,
     targets=targets,
 )
