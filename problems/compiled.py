@@ -18,6 +18,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import casadi as ca
 import numpy as np
 
+from .layers import calls_externals, layers_of
 from .switching import Switching
 
 Owner = TypeVar("Owner", bound="Deriving")
@@ -370,7 +371,9 @@ def _essence(function: ca.Function, ranges: Sequence[Sequence[tuple[float, float
     rng = np.random.default_rng(0)
     points = [np.array([rng.uniform(*limits, 64) for limits in group]).reshape(-1, 64) for group in ranges]
     values = np.array(function(*points)) if function.size1_out(0) else np.empty(0)
-    return function.str(True).encode() + " ".join(f"{value:.8e}" for value in values.ravel()).encode()
+    layers = layers_of(function) if calls_externals(function) else None
+    text = function.str(True) if layers is None else "".join(part.str(True) for part in layers.parts)
+    return text.encode() + " ".join(f"{value:.8e}" for value in values.ravel()).encode()
 
 
 def vector_function(name: str, groups: Mapping[str, Sequence[ca.MX]], expressions: Sequence[ca.MX]) -> ca.Function:
@@ -380,4 +383,6 @@ def vector_function(name: str, groups: Mapping[str, Sequence[ca.MX]], expression
     entries = [vector[i] for vector, symbols in zip(inputs, groups.values(), strict=True) for i in range(len(symbols))]
     column = ca.vertcat(*expressions) if expressions else ca.MX(0, 1)
     (column,) = ca.substitute([ca.densify(column)], scalars, entries)
-    return ca.Function(name, inputs, [column], list(groups), [name])
+    function = ca.Function(name, inputs, [column], list(groups), [name])
+    # In one graph, so that externals in it are found at once.
+    return ca.Function(name, inputs, [column], list(groups), [name], {"always_inline": True}) if calls_externals(function) else function

@@ -11,6 +11,7 @@ import numpy as np
 from . import checks
 from .absolute import absolute_terms, branches, radicand
 from .compiled import CompiledPhase, Limit, Variable, vector_function
+from .external import named, output_names
 from .switching import COMPARISONS, at_time, corners, same, sides, switching, value_at
 
 _KINDS = ("initial", "final", "integral", "peak")
@@ -131,9 +132,17 @@ class Phase:
         self._controls[name] = Variable(name, *limits, checks.unit(unit, what), factor, length)
         return self._new_symbol(name)
 
-    def dynamics(self, **rates: Any) -> None:
-        """Give the rate of every state, per `time_unit`: an expression of the phase's symbols and the parameters, or a number."""
+    def dynamics(self, external: ca.MX | None = None, /, **rates: Any) -> None:
+        """Give the rate of every state, per `time_unit`: an expression of the phase's symbols and the parameters, or a number.
+
+        `external` has the rates of those states that `problems.external` names as what it returns.
+        """
         place = f"phase '{self.name}'"
+        if external is not None:
+            names = output_names(external)
+            if not set(names) <= set(self._states) or set(names) & set(rates):
+                raise ValueError(f"{place}: the external returns [{', '.join(names)}], states are [{', '.join(self._states)}]")
+            rates |= zip(names, ca.vertsplit(external), strict=True)
         if self._rates:
             raise ValueError(f"{place}: dynamics are given twice")
         self._check_rates(rates)
@@ -289,6 +298,9 @@ class Phase:
         return symbol
 
     def _expression(self, value: Any, what: str) -> ca.MX:
+        groups = {"states": self._states, "controls": self._controls, "parameters": self._parameters}
+        symbols = {kind: {name: self._symbols.get(name, self._parameters.get(name)) for name in group} for kind, group in groups.items()}
+        value = named(value, symbols | {"time": {"time": self.time}}, what)
         own = self._hashes, {symbol.__hash__() for symbol in self._parameters.values()}
         hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem}'"
         return checks.expression(value, own, what, hint)

@@ -17,6 +17,7 @@ import numpy as np
 
 from .absolute import terms
 from .compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered
+from .layers import check_externals
 
 FEW, MOST = 64, 2048
 """Samples: as many as do where each expression is a number at one of them, and the most."""
@@ -171,6 +172,7 @@ def _finite(function: ca.Function, inputs: Sequence[np.ndarray], labels: Sequenc
     """Values of a Function (rows, count); those that are no numbers replaced by others of the same row."""
     if not labels:
         return np.empty((0, inputs[0].shape[1]))
+    check_externals(function, inputs)
     values = np.array(function(*inputs))
     for label, row in zip(labels, values, strict=True):
         good = np.isfinite(row)

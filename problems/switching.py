@@ -59,17 +59,23 @@ def switching(groups: Mapping[str, Sequence[ca.MX]], expressions: Sequence[ca.MX
     return Switching(tuple(labels), tuple(words), ca.Function("switches", inputs, [found]), ca.Function("sides", [*inputs, w], [sides]))
 
 
-def inlined(expression: ca.MX) -> ca.MX:
-    """The expression with the operations of Functions that it calls in their place, as far as they have any to show."""
+def inlined(expression: ca.MX, wanted: Callable[[ca.Function], bool] = lambda function: True) -> ca.MX:
+    """The expression with the operations of Functions that it calls in their place, as far as they have any to show and are `wanted`."""
     flat = ("MXFunction", "SXFunction")
     while True:
-        outputs = [node for node in nodes(expression) if node.is_output() and node.dep(0).which_function().class_name() in flat]
+        calls = [(node, call.which_function()) for node in nodes(expression) if (call := called(node)) is not None]
+        outputs = [node for node, function in calls if function.class_name() in flat and wanted(function)]
         if not outputs:
             return expression
         calls = [node.dep(0) for node in outputs]
         values = [call.which_function().call([call.dep(i) for i in range(call.n_dep())], True, False) for call in calls]
         chosen = [value[node.which_output()] for value, node in zip(values, outputs, strict=True)]
         (expression,) = ca.graph_substitute([expression], outputs, chosen)
+
+
+def called(node: ca.MX) -> ca.MX | None:
+    """The call of a Function that a node is a result of, if it is one."""
+    return node.dep(0) if node.is_output() and node.dep(0).op() == ca.OP_CALL else None
 
 
 def same(one: ca.MX, other: ca.MX) -> bool:
@@ -104,14 +110,17 @@ def _text(expression: ca.MX) -> str:
 
 
 def nodes(expression: ca.MX) -> list[ca.MX]:
-    """All nodes of a graph, each once."""
+    """All nodes of a graph, each once, after those that it depends on."""
     seen: dict[int, ca.MX] = {}
+    entered: set[int] = set()
     left = [expression]
     while left:
-        node = left.pop()
-        if node.__hash__() not in seen:
-            seen[node.__hash__()] = node
-            left += [node.dep(i) for i in range(node.n_dep())]
+        node = left[-1]
+        if node.__hash__() in entered:
+            seen.setdefault(node.__hash__(), left.pop())
+        else:
+            entered.add(node.__hash__())
+            left += [node.dep(i) for i in range(node.n_dep()) if node.dep(i).__hash__() not in entered]
     return list(seen.values())
 
 
@@ -156,10 +165,10 @@ def corners(expressions: Sequence[ca.MX], time: ca.MX, ends: tuple[float, float]
     `most`, none. Tables are linear interpolants of expressions that are linear in time."""
     seen: list[ca.MX] = []
     for node in nodes(inlined(ca.vertcat(*expressions))):
-        called = node.dep(0) if node.is_output() else None
-        table = called is not None and called.which_function().class_name() == "LinearInterpolant" and called.dep(0).numel() == 1
+        call = called(node)
+        table = call is not None and call.which_function().class_name() == "LinearInterpolant" and call.dep(0).numel() == 1
         if (table or node.op() in COMPARISONS) and [one.__hash__() for one in ca.symvar(node)] == [time.__hash__()]:
-            line = called.dep(0) if table and called is not None else node.dep(0) - node.dep(1)
+            line = call.dep(0) if table and call is not None else node.dep(0) - node.dep(1)
             if ca.jacobian(line, time).is_constant():
                 seen.append(ca.jacobian(node, time) if table else node)
     if not seen or not ends[0] < ends[1]:

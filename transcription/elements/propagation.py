@@ -15,7 +15,9 @@ import numpy as np
 
 from problems.compiled import CompiledPhase
 
-from ..numerics.batched import expanded
+from problems.layers import calls_externals, mapped
+
+from ..numerics.batched import chained, expanded
 from ..phases.writer import unwrapped_law, wrapped_controls
 from .tables import Tables
 
@@ -32,17 +34,18 @@ class Propagation:
         self._equations = _equations(tables, phase, ca.MX)
         self._step: ca.Function | None = None
         # Only elements of few unknowns, and few instructions, have their Newton steps written out.
-        if len(phase.states) * len(tables.tau) <= MOST_UNKNOWNS and expanded(phase.dynamics).is_a("SXFunction"):
-            written = _equations(tables, phase, ca.SX)
+        few, external = len(phase.states) * len(tables.tau) <= MOST_UNKNOWNS, calls_externals(phase.dynamics)
+        if few and (external or expanded(phase.dynamics).is_a("SXFunction")):
+            written = self._equations if external else _equations(tables, phase, ca.SX)
             step = _written_out(written, tables)
             if step.n_instructions() <= 30_000:
                 self._equations, self._step = written, step
-        self.quick = self._step is not None
+        self.quick = self._step is not None and not external
         self.inputs = sum(symbol.numel() for symbol in self._equations.symbols[1:])
 
     def elements(self, robust: bool) -> ca.Function:
         """(initial, U, starts, h, s) -> (right ends (nx, N), coefficients (nx, N k), residuals (1, N)); inputs stand side by side."""
-        return self.step(robust).mapaccum("elements", self.n)
+        return chained(self.step(robust), self.n)
 
     def step(self, robust: bool) -> ca.Function:
         """The same for one element."""
@@ -52,7 +55,7 @@ class Propagation:
 
     def derivatives(self, interior: bool) -> ca.Function:
         """(X, right, left, U, starts, h, s) -> derivatives (nx, N `inputs`) of the right ends [and of X] by left, U, start, h and s."""
-        return _gradient(self._equations, self.tables, self.phase, interior).map(self.n)
+        return mapped(_gradient(self._equations, self.tables, self.phase, interior), self.n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +76,11 @@ def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
     start, h, s = symbol.sym("start"), symbol.sym("h"), symbol.sym("s", parameters)
     controls = wrapped_controls(unwrapped_law(U, phase) @ ca.DM(tables.control(tables.tau)).T, phase)
     Y, scales = ca.reshape(y, nx, nq), ca.DM([v.scale for v in phase.states])
-    rates = ca.horzcat(*(phase.dynamics(Y[:, i], controls[:, i], start + 0.5 * h * (1.0 + tables.tau[i]), s) for i in range(nq)))
+    times = [start + 0.5 * h * (1.0 + tau) for tau in tables.tau]
+    if calls_externals(phase.dynamics):
+        rates = mapped(phase.dynamics, nq).call([Y, controls, ca.horzcat(*times), ca.repmat(s, 1, nq)], True, False)[0]
+    else:
+        rates = ca.horzcat(*(phase.dynamics(Y[:, i], controls[:, i], times[i], s) for i in range(nq)))
     implicit, recover = (ca.sparsify(ca.DM(matrix)) for matrix in (tables.implicit, tables.recover))
     residual = ca.vec(Y - ca.repmat(left, 1, nq) - h * (rates @ implicit)) / ca.repmat(scales, nq, 1)
     X = ca.repmat(left, 1, tables.coefficients) + h * (rates @ recover)
@@ -84,13 +91,15 @@ def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
 def _written_out(element: _Equations, tables: Tables) -> ca.Function:
     """(left, U, start, h, s) -> (right, X, largest residual) by Newton steps from the states that the rates at the left end give."""
     y, left, *others = element.symbols
-    whole = ca.Function("whole", list(element.symbols), [element.residual, element.rates, element.right, element.X])
-    jacobian = ca.Function("jacobian", list(element.symbols), [ca.jacobian(element.residual, y)])
+    inline = {"always_inline": isinstance(y, ca.MX)}
+    whole = ca.Function("whole", list(element.symbols), [element.residual, element.rates, element.right, element.X], inline)
+    jacobian = ca.Function("jacobian", list(element.symbols), [ca.jacobian(element.residual, y)], inline)
+    solve = elimination(jacobian.sparsity_out(0)) if isinstance(y, ca.MX) else lambda matrix, right: eliminate(ca.sparsify(matrix), right)
     nq, h = len(tables.tau), others[2]
     Y = ca.repmat(left, nq, 1)
     Y = Y + h * ca.vec(whole(Y, left, *others)[1] @ ca.DM(tables.implicit))
     for _ in range(5):
-        Y = Y - eliminate(ca.sparsify(jacobian(Y, left, *others)), whole(Y, left, *others)[0])
+        Y = Y - solve(jacobian(Y, left, *others), whole(Y, left, *others)[0])
     residual, _, right, X = whole(Y, left, *others)
     return ca.Function("step", [left, *others], [ca.densify(right), ca.densify(X), ca.mmax(ca.fabs(residual))], {"cse": True})
 
@@ -133,6 +142,12 @@ def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interio
     X, right = type(y).sym("X", len(phase.states), tables.coefficients), type(y).sym("right", len(phase.states))
     Y = ca.horzcat(inputs[0], X, right) @ ca.sparsify(ca.DM(tables.inside))
     return ca.Function("gradient", [X, right, *inputs], [gradient(ca.vec(Y), *inputs)], {"cse": symbolic})
+
+
+def elimination(sparsity: ca.Sparsity, columns: int = 1) -> ca.Function:
+    """(matrix, right) -> their solution by `eliminate`, to be called in other graphs."""
+    matrix, right = ca.SX.sym("matrix", sparsity), ca.SX.sym("right", sparsity.shape[0], columns)
+    return ca.Function("solve", [matrix, right], [ca.densify(eliminate(matrix, right))], {"cse": True})
 
 
 def eliminate(matrix: ca.SX, right: ca.SX) -> ca.SX:

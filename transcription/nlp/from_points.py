@@ -9,6 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from problems.layers import mapped
+
 from ..base import NLP
 from ..phases.rows import Parts
 
@@ -38,7 +40,7 @@ class FromPoints:
                 self._A = self._A + _product(common.to, _product(slopes, common.A))
                 self._shared.append((p, common))
             self._inputs.append((v, y[one.fixed, :]))
-        found = [one.slopes.map(v.shape[1])(v, rest) for one, (v, rest) in zip(self._points, self._inputs, strict=True)]
+        found = [mapped(one.slopes, v.shape[1])(v, rest) for one, (v, rest) in zip(self._points, self._inputs, strict=True)]
         self.rows, self.q = parts.affine.call([self.z, *(w for w, _ in found)])
         self._slopes = ca.MX(self._blocks, ca.veccat(*(slopes for _, slopes in found)))
         self._values_by_z = _product(self._slopes, self._A)
@@ -92,7 +94,7 @@ class FromPoints:
         for one, (v, rest) in zip(self._points, self._inputs, strict=True):
             curvature, sparsity = one.curvature()
             size, k = curvature.size1_in(2), v.shape[1]
-            halves.append(curvature.map(k)(v, rest, ca.reshape(of_values[first : first + size * k], size, k)))
+            halves.append(mapped(curvature, k)(v, rest, ca.reshape(of_values[first : first + size * k], size, k)))
             sparsities.append((sparsity, k))
             first += size * k
         H = _product(self._A.T, _product(ca.MX(_diagonal(sparsities), ca.veccat(*halves)), self._A))

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from problems.compiled import remembered
+from problems.external import reraise
 from problems.sampling import refuse_peaks
 
 from ..base import INFEASIBLE, NLP, TIMEOUT
@@ -60,6 +61,7 @@ class Watched:
                 signal.signal(signal.SIGINT, usual)
         if watch.raised is not None:
             raise watch.raised
+        reraise()
         return answer
 
     def stats(self) -> dict[str, Any]:

@@ -16,6 +16,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from problems.external import reraise
+from problems.layers import calls_externals, mapped
+
 from ..stopping import stopping
 
 COMPILER_SECONDS = 30.0
@@ -123,7 +126,7 @@ class Batched:
         self._sizes = [function.nnz_out(i) for i in range(function.n_out())]
         self._blocks: dict[int, tuple[Any, Callable[[], None]]] = {}
         self._width = 0
-        self._may_compile = compiled and compiler() is not None
+        self._may_compile = compiled and compiler() is not None and not calls_externals(function)
         # Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function of 1500 is worth compiling.
         self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else 30_000_000
         self._work, self.instructions, self._length = 0, work(function), _length(function)
@@ -161,6 +164,7 @@ class Batched:
                 if values.size:
                     buffer.set_res(i, values[first:last].data)
             evaluate()
+            reraise()
             if buffer.ret():
                 raise RuntimeError(f"{self._function.name()} failed")
         return outputs
@@ -168,7 +172,7 @@ class Batched:
     def _block(self, size: int) -> tuple[Any, Callable[[], None]]:
         if size not in self._blocks:
             wide = self._wide if size == self._width else None
-            self._blocks[size] = (self._function if size == 1 else wide(size) if wide else self._function.map(size)).buffer()
+            self._blocks[size] = (self._function if size == 1 else wide(size) if wide else mapped(self._function, size)).buffer()
         return self._blocks[size]
 
     def _compile(self, arrays: list[np.ndarray], expected: list[np.ndarray]) -> None:
@@ -226,6 +230,17 @@ def widened(function: ca.Function, k: int) -> ca.Function:
         else:
             memory[out[0]] = ca.MX.binary(operation, memory[of[0]], memory[of[1]])
     return ca.Function(function.name(), symbols, [ca.densify(ca.horzcat(ca.MX(k, 0), *columns)) for columns in found])
+
+
+def chained(function: ca.Function, n: int) -> ca.Function:
+    """n calls one after the other, as by `Function.mapaccum`, in which externals stay visible."""
+    if not calls_externals(function):
+        return function.mapaccum(f"{function.name()}s", n)
+    state, *others = (ca.MX.sym(function.name_in(i), function.size1_in(i), function.size2_in(i) * (n if i else 1)) for i in range(function.n_in()))
+    results, parts = [[state]], [ca.horzsplit(one, one.shape[1] // n) for one in others]
+    for inputs in zip(*parts, strict=True):
+        results.append(function.call([results[-1][0], *inputs], True, False))
+    return ca.Function(f"{function.name()}s", [state, *others], [ca.horzcat(*one) for one in zip(*results[1:], strict=True)])
 
 
 def expanded(function: ca.Function) -> ca.Function:

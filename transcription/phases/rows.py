@@ -9,6 +9,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from problems.layers import mapped
+
 from ..numerics.batched import expanded
 
 
@@ -36,7 +38,7 @@ class Pointwise:
     @cached_property
     def evaluated(self) -> ca.MX:
         """What it returns, (size of w, k), in the variables."""
-        return self.function.map(self.count)(self.inputs)
+        return mapped(self.function, self.count)(self.inputs)
 
 
 @dataclass(frozen=True, eq=False)

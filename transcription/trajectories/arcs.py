@@ -11,6 +11,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from problems.compiled import CompiledPhase, remembered
+from problems.external import reraise
+from problems.layers import mapped
 
 from ..numerics.batched import expanded
 from ..numerics.polynomials import basis_matrix, monomials
@@ -144,6 +146,7 @@ class Arcs:
             if periodic:
                 u[:] = wrapped(u, controls)
             trigger()
+            reraise()
             return (half * out).ravel()
 
         return rates
@@ -155,4 +158,4 @@ def _rate_function(phase: CompiledPhase, n: int) -> ca.Function:
     inputs = [ca.MX.sym(name, phase.dynamics.size1_in(i)) for i, name in enumerate("xuts")]
     rates = ca.vertcat(phase.dynamics(*inputs), phase.integrands(*inputs))
     function = expanded(ca.Function("rates", inputs, [ca.densify(rates)]))
-    return function.map(n) if n > 1 else function
+    return mapped(function, n) if n > 1 else function

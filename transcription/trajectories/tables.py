@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from problems.compiled import CompiledPhase, CompiledProblem, remembered
-from problems.switching import inlined, nodes
+from problems.switching import called, inlined, nodes
 
 from ..numerics.batched import Batched
 from .trajectory import PhaseTrajectory, Trajectory, moment
@@ -106,11 +106,11 @@ def _tables(phase: CompiledPhase) -> tuple[list[tuple[str, int]], Batched]:
     rows = [function(*inputs) for function in (phase.dynamics, phase.path, phase.integrands, phase.peaks)]
     names, found = list[tuple[str, int]](), list[ca.MX]()
     for node in nodes(inlined(ca.vertcat(*rows))):
-        called = node.dep(0) if node.is_output() else None
-        if called is not None and called.which_function().class_name() in TABLES and called.dep(0).numel() == node.numel() == 1:
-            states = np.flatnonzero(ca.which_depends(called.dep(0), inputs[0], 1, False))
-            name = called.which_function().name()
+        call = called(node)
+        if call is not None and call.which_function().class_name() in TABLES and call.dep(0).numel() == node.numel() == 1:
+            states = np.flatnonzero(ca.which_depends(call.dep(0), inputs[0], 1, False))
+            name = call.which_function().name()
             if len(states) == 1 and (name, int(states[0])) not in names:
                 names.append((name, int(states[0])))
-                found += [ca.vertcat(node), called.dep(0)]
+                found += [ca.vertcat(node), call.dep(0)]
     return names, Batched(ca.Function("tables", inputs, [ca.vertcat(*found)]))
