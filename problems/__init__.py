@@ -2,7 +2,7 @@
 
 from .catalogue import describe, is_catalogued, load, names
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
-from .external import external
+from .externals import external
 from .phase import Phase
 from .problem import Problem
 from .vector import CompiledVectorProblem, VectorProblem

@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from .external import EXTERNALS, External
+from .externals import EXTERNALS, External
 from .switching import inlined, nodes
 
 
@@ -39,7 +39,10 @@ class Layers:
     def mapped(self, k: int) -> ca.Function:
         """The Function for k sets of inputs side by side."""
         count = len(self.names[1])
-        known = [ca.MX.sym(name, rows, columns * k) for name, (rows, columns) in zip(self.names[1], map(self.last.size_in, range(count)), strict=True)]
+        known = [
+            ca.MX.sym(name, rows, columns * k)
+            for name, (rows, columns) in zip(self.names[1], map(self.last.size_in, range(count)), strict=True)
+        ]
         symbols = list(known)
         for call in self.calls:
             arguments = call.arguments.map(k)(*known)
@@ -57,6 +60,7 @@ def calls_externals(function: ca.Function) -> bool:
     return bool(EXTERNALS) and any(part.name() in EXTERNALS for part in function.find_functions())
 
 
+@lru_cache(maxsize=128)
 def mapped(function: ca.Function, k: int) -> ca.Function:
     """The Function for k sets of inputs side by side; externals are called once for all of them."""
     layers = layers_of(function) if calls_externals(function) else None
@@ -68,7 +72,7 @@ def layers_of(function: ca.Function) -> Layers | None:
     """The layers of a Function; None where no call of an external can be taken out of it, as from an iteration."""
     symbols = function.mx_in()
     outputs = function.call(symbols, True, False)
-    column = inlined(ca.vertcat(*(one.nz[:] for one in outputs)), calls_externals)
+    column = ca.cse(inlined(ca.vertcat(*(one.nz[:] for one in outputs)), calls_externals))
     depths: dict[int, int] = {}
     found: dict[tuple[int, External, int], list[ca.MX]] = {}
     for node in nodes(column):

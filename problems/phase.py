@@ -11,7 +11,7 @@ import numpy as np
 from . import checks
 from .absolute import absolute_terms, branches, radicand
 from .compiled import CompiledPhase, Limit, Variable, vector_function
-from .external import named, output_names
+from .externals import named, output_names
 from .switching import COMPARISONS, at_time, corners, same, sides, switching, value_at
 
 _KINDS = ("initial", "final", "integral", "peak")

@@ -17,7 +17,8 @@ import numpy as np
 
 from .absolute import terms
 from .compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered
-from .layers import check_externals
+from .externals import reraise
+from .layers import check_externals, mapped
 
 FEW, MOST = 64, 2048
 """Samples: as many as do where each expression is a number at one of them, and the most."""
@@ -173,7 +174,8 @@ def _finite(function: ca.Function, inputs: Sequence[np.ndarray], labels: Sequenc
     if not labels:
         return np.empty((0, inputs[0].shape[1]))
     check_externals(function, inputs)
-    values = np.array(function(*inputs))
+    values = np.array(mapped(function, inputs[0].shape[1])(*inputs))
+    reraise()
     for label, row in zip(labels, values, strict=True):
         good = np.isfinite(row)
         if not good.any():

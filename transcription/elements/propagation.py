@@ -14,7 +14,6 @@ import casadi as ca
 import numpy as np
 
 from problems.compiled import CompiledPhase
-
 from problems.layers import calls_externals, mapped
 
 from ..numerics.batched import chained, expanded

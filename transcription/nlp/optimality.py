@@ -15,6 +15,7 @@ from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack, identity, 
 from scipy.sparse.linalg import SuperLU, splu
 
 from problems.compiled import CompiledPhase, CompiledProblem, remembered
+from problems.layers import mapped
 
 from ..base import NLP
 from ..trajectories.costates import Costates, PhaseCostates
@@ -367,7 +368,7 @@ def hamiltonian(
 ) -> np.ndarray:
     """H (k,) at k places, from costates and states (k, nx), weights of the integrals (nq,), controls (k, nu), times (k,) and s (ns,)."""
     inputs = x.T, u.T, t[None], s
-    rates, integrands = (np.array(function(*inputs)).reshape(-1, len(t)) for function in (phase.dynamics, phase.integrands))
+    rates, integrands = (np.array(mapped(function, len(t))(*inputs)).reshape(-1, len(t)) for function in (phase.dynamics, phase.integrands))
     return np.asarray(np.einsum("ki,ik->k", costates, rates) + weights @ integrands)
 
 

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from problems.compiled import remembered
-from problems.external import reraise
+from problems.externals import reraise
 from problems.sampling import refuse_peaks
 
 from ..base import INFEASIBLE, NLP, TIMEOUT

@@ -16,7 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from problems.external import reraise
+from problems.externals import reraise
 from problems.layers import calls_externals, mapped
 
 from ..stopping import stopping
@@ -236,7 +236,9 @@ def chained(function: ca.Function, n: int) -> ca.Function:
     """n calls one after the other, as by `Function.mapaccum`, in which externals stay visible."""
     if not calls_externals(function):
         return function.mapaccum(f"{function.name()}s", n)
-    state, *others = (ca.MX.sym(function.name_in(i), function.size1_in(i), function.size2_in(i) * (n if i else 1)) for i in range(function.n_in()))
+    state, *others = (
+        ca.MX.sym(function.name_in(i), function.size1_in(i), function.size2_in(i) * (n if i else 1)) for i in range(function.n_in())
+    )
     results, parts = [[state]], [ca.horzsplit(one, one.shape[1] // n) for one in others]
     for inputs in zip(*parts, strict=True):
         results.append(function.call([results[-1][0], *inputs], True, False))
@@ -244,8 +246,9 @@ def chained(function: ca.Function, n: int) -> ca.Function:
 
 
 def expanded(function: ca.Function) -> ca.Function:
-    """The function as a flat list of scalar operations, several times faster, where its parts allow that (a Callback does not)."""
-    if any(part.name() == CHAIN for part in function.find_functions()):
+    """The function as a flat list of scalar operations, several times faster, where its parts allow that. Externals, which CasADi would call
+    point by point, do not."""
+    if calls_externals(function) or any(part.name() == CHAIN for part in function.find_functions()):
         return function
     try:
         return function.expand()

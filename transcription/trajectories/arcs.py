@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from problems.compiled import CompiledPhase, remembered
-from problems.external import reraise
+from problems.externals import reraise
 from problems.layers import mapped
 
 from ..numerics.batched import expanded
