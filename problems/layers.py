@@ -21,16 +21,23 @@ from .switching import inlined, nodes
 
 @dataclass(frozen=True, eq=False)
 class Call:
-    """Derivatives of an order of an external, at several points."""
+    """A Function, or derivatives of an order of an external, for several sets of inputs side by side."""
 
-    arguments: ca.Function  # inputs of the whole, and values of the calls before -> (inputs of the external, points)
-    external: External
-    order: int
+    arguments: ca.Function  # inputs of the whole, and values of the calls before -> inputs of the call
+    called: ca.Function | tuple[External, int]
+    count: int
+
+    def at(self, k: int, arguments: Sequence[ca.MX]) -> list[ca.MX]:
+        """Its values for so many times as many sets."""
+        if isinstance(self.called, ca.Function):
+            return list(self.called.map(self.count * k).call(arguments))
+        external, order = self.called
+        return [external.points(order, self.count * k)(arguments[0])]
 
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """A Function as calls of externals, one after the other, and what becomes of their values."""
+    """A Function as calls, one after the other, and what becomes of their values."""
 
     calls: tuple[Call, ...]
     last: ca.Function  # inputs of the whole, and values of all calls -> outputs
@@ -38,26 +45,23 @@ class Layers:
 
     def mapped(self, k: int) -> ca.Function:
         """The Function for k sets of inputs side by side."""
-        count = len(self.names[1])
-        known = [
-            ca.MX.sym(name, rows, columns * k)
-            for name, (rows, columns) in zip(self.names[1], map(self.last.size_in, range(count)), strict=True)
-        ]
-        symbols = list(known)
+        name, inputs, outputs = self.names
+        sizes = [self.last.size_in(i) for i in range(len(inputs))]
+        known = [ca.MX.sym(word, rows, columns * k) for word, (rows, columns) in zip(inputs, sizes, strict=True)]
         for call in self.calls:
-            arguments = call.arguments.map(k)(*known)
-            known.append(call.external.points(call.order, arguments.shape[1])(arguments))
-        return ca.Function(self.names[0], symbols, self.last.map(k).call(known), *self.names[1:])
+            known += call.at(k, call.arguments.map(k).call(known))
+        return ca.Function(name, known[: len(inputs)], self.last.map(k).call(known), inputs, outputs)
 
     @property
-    def parts(self) -> tuple[ca.Function, ...]:
+    def parts(self) -> list[ca.Function]:
         """All Functions in it."""
-        return *(call.arguments for call in self.calls), self.last
+        called = [call.called for call in self.calls if isinstance(call.called, ca.Function)]
+        return [*(call.arguments for call in self.calls), *called, self.last]
 
 
 def calls_externals(function: ca.Function) -> bool:
     """Whether there is a call of an external anywhere in a Function."""
-    return bool(EXTERNALS) and any(part.name() in EXTERNALS for part in function.find_functions())
+    return bool(EXTERNALS) and any(part.name() in EXTERNALS for part in (function, *function.find_functions()))
 
 
 @lru_cache(maxsize=128)
@@ -74,34 +78,40 @@ def layers_of(function: ca.Function) -> Layers | None:
     outputs = function.call(symbols, True, False)
     column = ca.cse(inlined(ca.vertcat(*(one.nz[:] for one in outputs)), calls_externals))
     depths: dict[int, int] = {}
-    found: dict[tuple[int, External, int], list[ca.MX]] = {}
-    for node in nodes(column):
+    found: dict[tuple[int, str], list[ca.MX]] = {}
+    every = nodes(column)
+    for node in every:
         depth = max((depths[node.dep(i).__hash__()] for i in range(node.n_dep())), default=0)
-        points = EXTERNALS.get(node.which_function().name()) if node.op() == ca.OP_CALL else None
-        if points is not None:
+        if node.op() == ca.OP_CALL:
             depth += 1
-            found.setdefault((depth, points.external, points.order), []).append(node)
+            found.setdefault((depth, str(node.which_function().__hash__())), []).append(node)
         depths[node.__hash__()] = depth
-    if not found:
+    groups = [group for _, group in sorted(found.items(), key=lambda item: item[0][0])]
+    if not any(group[0].which_function().name() in EXTERNALS for group in groups):
         return None
-    groups = sorted(found.items(), key=lambda item: item[0][0])
-    values = [ca.MX.sym("v", one.size(order), sum(node.dep(0).shape[1] for node in group)) for (_, one, order), group in groups]
-    places = {}
-    for value, (_, group) in zip(values, groups, strict=True):
-        ends = np.cumsum([0, *(node.dep(0).shape[1] for node in group)]).tolist()
-        places |= {node.__hash__(): part for node, part in zip(group, ca.horzsplit(value, ends), strict=True)}
-    results = [node for node in nodes(column) if node.is_output() and node.dep(0).__hash__() in places]
-    expressions = [ca.horzcat(*(node.dep(0) for node in group)) for _, group in groups]
-    replaced = ca.graph_substitute([*expressions, column], results, [places[node.dep(0).__hash__()] for node in results])
-    *arguments, last = replaced
+    arguments, values, places = [], [], {}
+    for group in groups:
+        one = group[0].which_function()
+        arguments.append([ca.horzcat(*(ca.densify(node.dep(i)) for node in group)) for i in range(one.n_in())])
+        own = [ca.MX.sym("v", one.sparsity_out(i) if len(group) == 1 else ca.repmat(one.sparsity_out(i), 1, len(group))) for i in range(one.n_out())]
+        values.append(own)
+        for i, value in enumerate(own):
+            places |= {(node.__hash__(), i): part for node, part in zip(group, ca.horzsplit(value, one.size2_out(i)), strict=True)}
+    results = [node for node in every if node.is_output() and (node.dep(0).__hash__(), node.which_output()) in places]
+    parts = [places[node.dep(0).__hash__(), node.which_output()] for node in results]
+    flat = ca.graph_substitute([*(one for own in arguments for one in own), column], results, parts)
+    *replaced, last = flat
+    left, known, calls = iter(replaced), list(symbols), []
+    for group, own, results in zip(groups, arguments, values, strict=True):
+        one = group[0].which_function()
+        inputs = _flat(ca.Function("arguments", known, [next(left) for _ in own]))
+        points = EXTERNALS.get(one.name())
+        count = len(group) * (points.count if points else 1)
+        calls.append(Call(inputs, (points.external, points.order) if points else one, count))
+        known = [*known, *results]
     split = ca.vertsplit(last, np.cumsum([0, *(one.nnz() for one in outputs)]).tolist())
     whole = [ca.MX(one.sparsity(), part) for one, part in zip(outputs, split, strict=True)]
-    made = tuple(
-        Call(_flat(ca.Function("arguments", [*symbols, *values[:k]], [ca.densify(one)])), external, order)
-        for k, (one, ((_, external, order), _)) in enumerate(zip(arguments, groups, strict=True))
-    )
-    names = function.name(), function.name_in(), function.name_out()
-    return Layers(made, _flat(ca.Function("last", [*symbols, *values], whole)), names)
+    return Layers(tuple(calls), _flat(ca.Function("last", known, whole)), (function.name(), function.name_in(), function.name_out()))
 
 
 def check_externals(function: ca.Function, inputs: Sequence[np.ndarray]) -> None:
@@ -109,9 +119,13 @@ def check_externals(function: ca.Function, inputs: Sequence[np.ndarray]) -> None
     layers = layers_of(function) if calls_externals(function) else None
     known = [np.asarray(one, dtype=float) for one in inputs]
     for call in layers.calls if layers else ():
-        arguments = np.array(call.arguments.map(known[0].shape[1])(*known)).T
-        call.external.check(arguments)
-        known.append(call.external.evaluate(call.order, arguments).T)
+        k = known[0].shape[1]
+        arguments = [np.array(one) for one in call.arguments.map(k).call(known)]
+        if isinstance(call.called, ca.Function):
+            known += [np.array(one) for one in call.called.map(call.count * k).call(arguments)]
+        else:
+            call.called[0].check(arguments[0].T)
+            known.append(call.called[0].evaluate(call.called[1], arguments[0].T).T)
 
 
 def _flat(function: ca.Function) -> ca.Function:

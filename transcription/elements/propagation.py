@@ -59,13 +59,15 @@ class Propagation:
 
 @dataclass(frozen=True, eq=False)
 class _Equations:
-    """One element, symbolically: inputs (Y as a column, left, U, start, h, s), the residual of Y, the rates at Y and the results."""
+    """One element, symbolically: inputs (Y as a column, left, U, start, h, s), the residual of Y, the rates at Y, the results, and the
+    derivatives of the residual by Y."""
 
     symbols: tuple[Any, ...]
     residual: Any
     rates: Any
     right: Any
     X: Any
+    by_states: Any
 
 
 def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
@@ -76,15 +78,30 @@ def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
     controls = wrapped_controls(unwrapped_law(U, phase) @ ca.DM(tables.control(tables.tau)).T, phase)
     Y, scales = ca.reshape(y, nx, nq), ca.DM([v.scale for v in phase.states])
     times = [start + 0.5 * h * (1.0 + tau) for tau in tables.tau]
-    if calls_externals(phase.dynamics):
-        rates = mapped(phase.dynamics, nq).call([Y, controls, ca.horzcat(*times), ca.repmat(s, 1, nq)], True, False)[0]
+    external = calls_externals(phase.dynamics)
+    if external:
+        points = [Y, controls, ca.horzcat(*times), ca.repmat(s, 1, nq)]
+        rates = mapped(phase.dynamics, nq).call(points, True, False)[0]
     else:
         rates = ca.horzcat(*(phase.dynamics(Y[:, i], controls[:, i], times[i], s) for i in range(nq)))
     implicit, recover = (ca.sparsify(ca.DM(matrix)) for matrix in (tables.implicit, tables.recover))
     residual = ca.vec(Y - ca.repmat(left, 1, nq) - h * (rates @ implicit)) / ca.repmat(scales, nq, 1)
     X = ca.repmat(left, 1, tables.coefficients) + h * (rates @ recover)
     right = left + 0.5 * h * (rates @ ca.DM(tables.weights))
-    return _Equations((y, left, U, start, h, s), residual, rates, right, X)
+    if external:
+        # Written down: CasADi would go through all points for each column.
+        slopes = mapped(by_states(phase.dynamics), nq).call(points, True, False)[0]
+        blocks = ca.MX(ca.kron(ca.DM.eye(nq), ca.DM.ones(nx, nx)).sparsity(), ca.vec(slopes))
+        of_residual = ca.mtimes(ca.diag(1.0 / ca.repmat(scales, nq, 1)), ca.DM.eye(nx * nq) - h * ca.mtimes(ca.kron(implicit.T, ca.DM.eye(nx)), blocks))
+    else:
+        of_residual = ca.jacobian(residual, y)
+    return _Equations((y, left, U, start, h, s), residual, rates, right, X, of_residual)
+
+
+def by_states(dynamics: ca.Function) -> ca.Function:
+    """(x, u, t, s) -> the derivatives (nx, nx) of the rates by the states, dense."""
+    inputs = dynamics.mx_in()
+    return ca.Function("by_states", inputs, [ca.densify(ca.jacobian(dynamics(*inputs), inputs[0]))])
 
 
 def _written_out(element: _Equations, tables: Tables) -> ca.Function:
@@ -92,7 +109,7 @@ def _written_out(element: _Equations, tables: Tables) -> ca.Function:
     y, left, *others = element.symbols
     inline = {"always_inline": isinstance(y, ca.MX)}
     whole = ca.Function("whole", list(element.symbols), [element.residual, element.rates, element.right, element.X], inline)
-    jacobian = ca.Function("jacobian", list(element.symbols), [ca.jacobian(element.residual, y)], inline)
+    jacobian = ca.Function("jacobian", list(element.symbols), [element.by_states], inline)
     solve = elimination(jacobian.sparsity_out(0)) if isinstance(y, ca.MX) else lambda matrix, right: eliminate(ca.sparsify(matrix), right)
     nq, h = len(tables.tau), others[2]
     Y = ca.repmat(left, nq, 1)
@@ -126,7 +143,7 @@ def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interio
     y, *inputs = element.symbols
     along = ca.veccat(*inputs)
     results = ca.vertcat(element.right, ca.vec(element.X)) if interior else element.right
-    by_states, by_inputs = ca.jacobian(element.residual, y), ca.jacobian(element.residual, along)
+    of_states, by_inputs = element.by_states, ca.jacobian(element.residual, along)
     direct, through = ca.jacobian(results, along), ca.jacobian(results, y)
     symbolic = isinstance(y, ca.SX)
 
@@ -134,9 +151,9 @@ def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interio
         return eliminate(matrix, right) if symbolic else ca.solve(matrix, right, "qr")
 
     if results.numel() < along.numel():
-        total = direct - solve(by_states.T, through.T).T @ by_inputs
+        total = direct - solve(of_states.T, through.T).T @ by_inputs
     else:
-        total = direct - through @ solve(by_states, by_inputs)
+        total = direct - through @ solve(of_states, by_inputs)
     gradient = ca.Function("by_states", [y, *inputs], [ca.densify(total)])
     X, right = type(y).sym("X", len(phase.states), tables.coefficients), type(y).sym("right", len(phase.states))
     Y = ca.horzcat(inputs[0], X, right) @ ca.sparsify(ca.DM(tables.inside))
