@@ -2,8 +2,8 @@
 
 In a graph, such a function is a call of `Points`: for one point in what users state, for all points at once in what is evaluated
 (`layers.py`). Derivatives are calls, too, so that each takes one call of the function for all perturbations of all points: by complex steps
-(Squire and Trapp, "Using complex variables to estimate derivatives of real functions", SIAM Review 40(1), 1998) or central differences; second
-derivatives are differences of the first.
+(Squire and Trapp, "Using complex variables to estimate derivatives of real functions", SIAM Review 40(1), 1998) or central differences;
+second derivatives are differences of the first.
 """
 
 from __future__ import annotations
@@ -296,7 +296,7 @@ class External:
             raise ValueError(f"{what} is {exact[k, i, j]:g} by the given Jacobian, and {differences[k, i, j]:g} by differences")
         self.derivatives = "finite"
         warnings.warn(
-            f"{what} is wrong by complex steps{why}: np.abs, float(), conversions, and tables of other packages, are made for real numbers. "
+            f"{what} is wrong by complex steps{why}: np.abs, float(), conversions and tables of other packages are for real numbers. "
             "Differences are used, as derivatives='finite' says; or give derivatives=jacobian",
             stacklevel=3,
         )

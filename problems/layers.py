@@ -1,7 +1,7 @@
 """Functions that call externals, in layers: what is called between Functions that CasADi knows whole.
 
-So cut, a Function is evaluated at many points with one call of each external in a layer for all of them, compares by its operations, and
-pickles: externals go as Python's own functions do, by module and name.
+So cut, a Function is evaluated at many points with one call of each external in a layer for all of them, and pickles: externals go as
+Python's own functions do, by module and name.
 """
 
 from __future__ import annotations
@@ -52,12 +52,6 @@ class Layers:
             known += call.at(k, call.arguments.map(k).call(known))
         return ca.Function(name, known[: len(inputs)], self.last.map(k).call(known), inputs, outputs)
 
-    @property
-    def parts(self) -> list[ca.Function]:
-        """All Functions in it."""
-        called = [call.called for call in self.calls if isinstance(call.called, ca.Function)]
-        return [*(call.arguments for call in self.calls), *called, self.last]
-
 
 def calls_externals(function: ca.Function) -> bool:
     """Whether there is a call of an external anywhere in a Function."""
@@ -76,7 +70,7 @@ def layers_of(function: ca.Function) -> Layers | None:
     """The layers of a Function; None where no call of an external can be taken out of it, as from an iteration."""
     symbols = function.mx_in()
     outputs = function.call(symbols, True, False)
-    column = ca.cse(inlined(ca.vertcat(*(one.nz[:] for one in outputs)), calls_externals))
+    column = ca.cse(inlined(ca.veccat(*(one.nz[:] for one in outputs)), calls_externals))
     depths: dict[int, int] = {}
     found: dict[tuple[int, str], list[ca.MX]] = {}
     every = nodes(column)
@@ -93,7 +87,10 @@ def layers_of(function: ca.Function) -> Layers | None:
     for group in groups:
         one = group[0].which_function()
         arguments.append([ca.horzcat(*(ca.densify(node.dep(i)) for node in group)) for i in range(one.n_in())])
-        own = [ca.MX.sym("v", one.sparsity_out(i) if len(group) == 1 else ca.repmat(one.sparsity_out(i), 1, len(group))) for i in range(one.n_out())]
+        own = [
+            ca.MX.sym("v", one.sparsity_out(i) if len(group) == 1 else ca.repmat(one.sparsity_out(i), 1, len(group)))
+            for i in range(one.n_out())
+        ]
         values.append(own)
         for i, value in enumerate(own):
             places |= {(node.__hash__(), i): part for node, part in zip(group, ca.horzsplit(value, one.size2_out(i)), strict=True)}

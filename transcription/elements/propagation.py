@@ -92,7 +92,9 @@ def _equations(tables: Tables, phase: CompiledPhase, symbol: Any) -> _Equations:
         # Written down: CasADi would go through all points for each column.
         slopes = mapped(by_states(phase.dynamics), nq).call(points, True, False)[0]
         blocks = ca.MX(ca.kron(ca.DM.eye(nq), ca.DM.ones(nx, nx)).sparsity(), ca.vec(slopes))
-        of_residual = ca.mtimes(ca.diag(1.0 / ca.repmat(scales, nq, 1)), ca.DM.eye(nx * nq) - h * ca.mtimes(ca.kron(implicit.T, ca.DM.eye(nx)), blocks))
+        of_residual = ca.mtimes(
+            ca.diag(1.0 / ca.repmat(scales, nq, 1)), ca.DM.eye(nx * nq) - h * ca.mtimes(ca.kron(implicit.T, ca.DM.eye(nx)), blocks)
+        )
     else:
         of_residual = ca.jacobian(residual, y)
     return _Equations((y, left, U, start, h, s), residual, rates, right, X, of_residual)

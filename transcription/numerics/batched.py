@@ -246,8 +246,8 @@ def chained(function: ca.Function, n: int) -> ca.Function:
 
 
 def expanded(function: ca.Function) -> ca.Function:
-    """The function as a flat list of scalar operations, several times faster, where its parts allow that. Externals, which CasADi would call
-    point by point, do not."""
+    """The function as a flat list of scalar operations, several times faster, where its parts allow that. Externals do not: they would be
+    called point by point."""
     if calls_externals(function) or any(part.name() == CHAIN for part in function.find_functions()):
         return function
     try:
