@@ -1,9 +1,8 @@
 """Functions that CasADi cannot look into, such as a simulator written with NumPy or a table of another package, in a problem's expressions.
 
-In a graph, such a function is a call of `Points`: for one point in what users state, for all points at once in what is evaluated
-(`layers.py`). Derivatives are calls, too, so that each takes one call of the function for all perturbations of all points: by complex steps
-(Squire and Trapp, "Using complex variables to estimate derivatives of real functions", SIAM Review 40(1), 1998) or central differences;
-second derivatives are differences of the first.
+In a graph, such a function is a call of `Points`, its derivatives too: of one point in what users state, of all at once where it is
+evaluated (`layers.py`). First derivatives are complex steps (Squire and Trapp, SIAM Review 40(1), 1998) or central differences, of all points
+in one call; second ones are differences of the first.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import casadi as ca
@@ -43,20 +43,19 @@ def external(
 ) -> ca.MX:
     """What a function of arrays returns, as an expression: rates for `Phase.dynamics`, or part of any other expression.
 
-    The function is called once for all points of a step, and for all perturbations of these where derivatives are needed. It must always
-    return the same for the same row, whatever rows stand beside it. Rows outside of its domain may be NaN. What it raises ends the work.
+    It is called once for all points of a step, or for all perturbations of these. The same row must always give the same, whatever rows
+    stand beside it; NaN is outside of its domain. What it raises ends the work.
 
     Parameters
     ----------
     function : callable
         `function(states, controls, parameters, time)` takes arrays (batch, n), columns in the order of the names, and time (batch,), and
-        returns (batch, outputs), or (batch,) for one output. One that takes a single row, arrays (n,), works too, and is slow.
+        returns (batch, outputs), or (batch,) for one output. One that takes a single row works too, and is slow.
     states, controls, parameters : sequence of str or MX
         What the columns are: names of the phase's states and controls and of the problem's parameters, or expressions.
     derivatives : "complex", "finite" or callable
-        Complex steps, which lose no digits, for functions that compute with complex numbers as with real ones; central differences; or a
-        function of the same arguments that returns (batch, outputs, inputs), where inputs are states, controls, parameters and, if it
-        depends on it, time. Where complex steps turn out wrong, a warning says so and differences are used.
+        Complex steps, which lose no digits; central differences; or a function of the same arguments that returns (batch, outputs, inputs),
+        time last or left out. Where complex steps turn out wrong, a warning says so and differences are used.
     outputs : sequence of str or int, optional
         Names of what is returned, or how many there are; by default the states, else as many as a trial returns.
 
@@ -68,20 +67,13 @@ def external(
     Raises
     ------
     ValueError
-        Where names or derivatives make no sense; by `Problem.compile`, where the function returns another shape, no finite number at all
-        or not always the same, or `derivatives` are wrong.
+        Where names or derivatives make no sense; by `Problem.compile`, for another shape, no finite number or not always the same.
 
     Examples
     --------
-    >>> import numpy as np
-    >>> from problems import Problem, external
-    >>> def rates(states, controls, parameters, time):
-    ...     x, v = states.T
-    ...     return np.stack([v, controls[:, 0] - 0.1 * v * v], axis=-1)
-    >>> run = Problem("sprint").phase("run", t0=0, tf=(1, 9))
-    >>> x, v = run.state("x", bounds=(0, 5), initial=0), run.state("v", bounds=(0, 2), initial=0)
-    >>> u = run.control("u", bounds=(0, 1))
-    >>> run.dynamics(external(rates, states=["x", "v"], controls=["u"]))
+    >>> from problems import external
+    >>> external(lambda states, controls, parameters, time: controls - states, states=["x"], controls=["u"]).shape
+    (1, 1)
     """
     groups = {"states": states, "controls": controls, "parameters": parameters}
     name = getattr(function, "__name__", type(function).__name__)
@@ -95,15 +87,11 @@ def external(
     if derivatives not in ("complex", "finite") and not callable(derivatives):
         raise ValueError(f"external '{name}': derivatives must be 'complex', 'finite' or a function, not {derivatives!r}")
     inputs = [*(str(one) for group in groups.values() for one in group), "time"]
-    states_named = len(states) > 0 and all(isinstance(one, str) for one in states)
     made = External(function, name, inputs, [len(group) for group in symbols], derivatives)
-    if isinstance(outputs, int):
-        made.outputs = [f"output {k}" for k in range(outputs)]
-    elif outputs is not None:
-        made.outputs = [str(one) for one in outputs]
-    else:
-        size = made.tried(np.ones((13, len(inputs)))) or len(states)
-        made.outputs = list(map(str, states)) if states_named and size == len(states) else [f"output {k}" for k in range(size)]
+    if outputs is None:
+        outputs = made.tried(np.ones((13, len(inputs)))) or len(states)
+        outputs = list(states) if outputs == len(states) and all(isinstance(one, str) for one in states) else outputs
+    made.outputs = [f"output {k}" for k in range(outputs)] if isinstance(outputs, int) else [*outputs]
     result: ca.MX = made.points(0, 1)(ca.vertcat(*(one for group in symbols for one in group), placeholder("time", "time")))
     return result
 
@@ -144,22 +132,21 @@ class External:
         self.function, self.name, self.inputs, self.counts, self.derivatives = function, name, inputs, counts, derivatives
         self.outputs: list[str] = []
         self.one_row, self.checked = False, False
-        self.noise, self.spans = np.finfo(float).eps, np.ones(len(inputs))
-        self._made: dict[tuple[int, int], Points] = {}
+        self.noise, self.spans = float(np.finfo(float).eps), np.ones(len(inputs))
+        self._made: dict[tuple[int, int], Points] = {}  # by order of derivatives and number of points
         self._last: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_made": {}, "_last": {}}
 
+    @property
+    def size(self) -> list[int]:
+        """How many derivatives of each order there are at a point."""
+        return [len(self.outputs) * len(self.inputs) ** order for order in range(3)]
+
     def points(self, order: int, count: int) -> Points:
         """The Function of derivatives of an order at so many points."""
-        if (order, count) not in self._made:
-            self._made[order, count] = Points(self, order, count)
-        return self._made[order, count]
-
-    def size(self, order: int) -> int:
-        """How many derivatives of an order there are at a point."""
-        return len(self.outputs) * len(self.inputs) ** order
+        return self._made.get((order, count)) or self._made.setdefault((order, count), Points(self, order, count))
 
     def evaluate(self, order: int, X: np.ndarray) -> np.ndarray:
         """Derivatives of an order (k, size) at points (k, inputs), each as a column-major matrix of those of the order before."""
@@ -174,32 +161,29 @@ class External:
     def values(self, X: np.ndarray) -> np.ndarray:
         """What the function returns, (k, outputs)."""
         found = self._called(self.function, X)
-        found = found[:, None] if found.ndim == 1 and len(self.outputs) == 1 else found
-        if found.shape != (len(X), len(self.outputs)):
-            hint = "; np.stack([...], axis=-1) makes columns of arrays (batch,)" if found.shape == (len(self.outputs), len(X)) else ""
-            wanted = f"({len(X)}, {len(self.outputs)}), a row for each of theirs with {', '.join(self.outputs)}"
-            raise ValueError(f"external '{self.name}' returned an array {found.shape} for {len(X)} rows and must return {wanted}{hint}")
-        return found
+        return self._shaped(found[:, None] if found.ndim == 1 and len(self.outputs) == 1 else found, (len(X), len(self.outputs)))
+
+    def _shaped(self, found: np.ndarray, wanted: tuple[int, ...]) -> np.ndarray:
+        """An array of the user's, if it has the shape that is wanted."""
+        if found.shape == wanted:
+            return found
+        hint = "; np.stack([...], axis=-1) makes columns of arrays (batch,)" if found.shape == wanted[::-1] else ""
+        raise ValueError(f"external '{self.name}' must return an array {wanted} of {', '.join(self.outputs)}, not {found.shape}{hint}")
 
     def jacobian(self, X: np.ndarray) -> np.ndarray:
         """(k, inputs, outputs)."""
         k, n = X.shape
         if callable(self.derivatives):
             found = self._called(self.derivatives, X)
-            if found.shape not in [(k, len(self.outputs), n), (k, len(self.outputs), n - 1)]:
-                wanted = f"({k}, {len(self.outputs)}, {n - 1}), or {n} with time"
-                raise ValueError(
-                    f"external '{self.name}': the Jacobian returned an array {found.shape} for {k} rows and must return {wanted}"
-                )
-            return np.pad(found, ((0, 0), (0, 0), (0, n - found.shape[2]))).swapaxes(1, 2)
+            wide = found.ndim == 3 and found.shape[2] == n
+            return np.pad(self._shaped(found, (k, len(self.outputs), n - (not wide))), ((0, 0), (0, 0), (0, not wide))).swapaxes(1, 2)
         if self.derivatives == "complex":
             step = 1e-30
             found = self.values((X + 1j * step * np.eye(n)[:, None]).reshape(n * k, n)).imag / step
         else:
             steps = self.spans * np.cbrt(3.0 * self.noise)
-            after, before = self.values(
-                (X + np.array([1.0, -1.0])[:, None, None, None] * np.diag(steps)[:, None]).reshape(2 * n * k, n)
-            ).reshape(2, n * k, -1)
+            moves = np.array([1.0, -1.0])[:, None, None, None] * np.diag(steps)[:, None]
+            after, before = self.values((X + moves).reshape(2 * n * k, n)).reshape(2, n * k, -1)
             found = (after - before) / np.repeat(2.0 * steps, k)[:, None]
         return found.reshape(n, k, -1).swapaxes(0, 1)
 
@@ -213,15 +197,11 @@ class External:
 
     def tried(self, X: np.ndarray) -> int:
         """How many outputs there are, and whether the function takes one row at a time, by a trial; 0 where it fails."""
-        errors = []
         for self.one_row, rows in ((False, X), (True, X[:1])):
-            try:
+            with suppress(Exception):
                 found = self._called(self.function, rows)
-            except Exception as error:
-                errors.append(error)
-                continue
-            if found.ndim in (1, 2) and len(found) == len(rows):
-                return found.shape[1] if found.ndim == 2 else 1
+                if found.ndim in (1, 2) and len(found) == len(rows):
+                    return found.shape[1] if found.ndim == 2 else 1
         self.one_row = False
         return 0
 
@@ -230,32 +210,25 @@ class External:
         if self.checked:
             return
         if not self.one_row:
-            self.tried(X[: len(X) - len(self.outputs) % 2])
-        begin = time.perf_counter()
-        W = self.values(X)
-        seconds = time.perf_counter() - begin
+            self.tried(X)
+        begin, W = time.perf_counter(), self.values(X)
         if self.one_row:
-            warnings.warn(
-                f"external '{self.name}' takes one row at a time, {1e6 * seconds / len(X):.3g} us each: derivatives at 100 points take "
-                f"{100 * seconds / len(X) * len(self.inputs):.2g} s. Written for arrays (batch, n), it is called once for all of them",
-                stacklevel=2,
+            each = (time.perf_counter() - begin) / len(X)
+            self._warn(
+                f"takes one row at a time, {1e6 * each:.3g} us each: derivatives at 100 points take {100 * each * len(self.inputs):.2g} s. "
+                "Written for arrays (batch, n), it is called once for all of them"
             )
         sizes = np.nanmax(np.abs(np.where(np.isfinite(W), W, np.nan)), axis=0, initial=0.0)
-        again, turned = self.values(X), self.values(X[::-1])[::-1]
-        for other, why in ((again, "when it is called again"), (turned, "when other rows stand beside them")):
+        for other, why in ((self.values(X), "when it is called again"), (self.values(X[::-1])[::-1], "when other rows stand beside them")):
             if not np.allclose(W, other, rtol=1e-9, atol=1e-12 * sizes, equal_nan=True):
-                raise ValueError(
-                    f"external '{self.name}' returns other values for the same rows {why}: it has a memory, or draws random numbers. "
-                    "States have to be declared as such, and each row has to depend on itself alone"
-                )
-        good = X[np.isfinite(W).all(axis=1)]
+                raise ValueError(f"external '{self.name}' returns other values for the same rows {why}: it has a memory, or mixes rows")
+        good, worst = X[np.isfinite(W).all(axis=1)], int(np.isfinite(W).sum(axis=0).argmin())
         if not len(good):
-            raise ValueError(f"external '{self.name}': {self._worst(W)} is not a finite number anywhere within the bounds")
+            raise ValueError(f"external '{self.name}': '{self.outputs[worst]}' is not a finite number anywhere within the bounds")
         spans = np.ptp(good, axis=0)
         self.spans = np.where(spans > 0.0, spans, np.maximum(np.abs(good).max(axis=0), 1.0))
         self._check_derivatives(good[:12], np.where(sizes > 0.0, sizes, 1.0))
-        self.checked = True
-        self._last = {}
+        self.checked, self._last = True, {}
 
     def _check_derivatives(self, X: np.ndarray, sizes: np.ndarray) -> None:
         """Estimate the noise of values, of these sizes, and compare the derivatives with differences."""
@@ -263,47 +236,41 @@ class External:
         # Fourth differences of smooth values are nothing but noise: More and Wild, "Estimating computational noise", SISC 33(3), 2011.
         along = np.arange(-2.0, 3.0)[:, None, None] * 1e-6 * self.spans
         fourth = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) @ self.values((X + along).reshape(-1, n)).reshape(5, -1)
-        noise = np.nanmedian(np.abs(fourth.reshape(len(X), -1)), axis=0) / np.sqrt(70.0)
-        self.noise = float(np.clip(np.nanmax(noise / sizes), np.finfo(float).eps, 1e-3))
+        last = np.nanmedian(np.abs(fourth.reshape(len(X), -1)), axis=0) / np.sqrt(70.0)
+        self.noise = float(np.clip(np.nanmax(last / sizes), np.finfo(float).eps, 1e-3))
         self.derivatives = "finite"
         differences = self.jacobian(X)
-        coarse, self.noise = self.noise, 8.0 * self.noise
-        apart, self.noise = np.abs(self.jacobian(X) - differences), coarse
         if given == "finite":
-            if self.noise > 1e-8:
-                warnings.warn(
-                    f"external '{self.name}' is noisy: the last digits that its values agree in are at {self.noise:.1g}", stacklevel=3
-                )
             return
+        noise, self.noise = self.noise, 8.0 * self.noise
+        apart, self.noise = np.abs(self.jacobian(X) - differences), noise
         self.derivatives = given
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                exact, why = self.jacobian(X), ""
-        except (TypeError, ValueError, NotImplementedError) as error:
+                exact = self.jacobian(X)
+        except (TypeError, ValueError, NotImplementedError):
             if given != "complex":
                 raise
-            exact, why = np.full_like(differences, np.inf), f" ({type(error).__name__}: {error})"
+            exact = np.full_like(differences, np.inf)
         large = np.nanmax(np.abs(differences), axis=0, initial=0.0) + (sizes * self.noise ** (2 / 3)) / self.spans[:, None]
         # Where differences of two steps disagree, as at kinks, they judge nothing.
         wrong = ~(np.abs(exact - differences) <= 1e-3 * large) & (apart <= 1e-4 * large)
         if not wrong.any():
             return
         _, i, j = np.argwhere(wrong)[0]
-        what = f"external '{self.name}': the derivative of '{self.outputs[j]}' by '{self.inputs[i]}'"
+        what = f"the derivative of '{self.outputs[j]}' by '{self.inputs[i]}'"
         if given != "complex":
             k = np.flatnonzero(wrong[:, i, j])[0]
-            raise ValueError(f"{what} is {exact[k, i, j]:g} by the given Jacobian, and {differences[k, i, j]:g} by differences")
+            raise ValueError(f"external '{self.name}': {what} is {exact[k, i, j]:g} as given, and {differences[k, i, j]:g} by differences")
         self.derivatives = "finite"
-        warnings.warn(
-            f"{what} is wrong by complex steps{why}: np.abs, float(), conversions and tables of other packages are for real numbers. "
-            "Differences are used, as derivatives='finite' says; or give derivatives=jacobian",
-            stacklevel=3,
+        self._warn(
+            f"{what} is wrong by complex steps, as by np.abs, float() or tables for real numbers: differences are used, as by "
+            "derivatives='finite'; or give derivatives=jacobian"
         )
 
-    def _worst(self, W: np.ndarray) -> str:
-        """The output that is a number least often."""
-        return f"'{self.outputs[int(np.isfinite(W).sum(axis=0).argmin())]}'"
+    def _warn(self, message: str) -> None:
+        warnings.warn(f"external '{self.name}': {message}", stacklevel=2)
 
     def _called(self, function: Callable[..., Any], X: np.ndarray) -> np.ndarray:
         """A function of the user's at points: arrays, or, where it takes one, row by row."""
@@ -333,7 +300,7 @@ class Points(ca.Callback):
         return ca.Sparsity.dense(len(self.external.inputs), self.count)
 
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self.external.size(self.order), self.count)
+        return ca.Sparsity.dense(self.external.size[self.order], self.count)
 
     def has_eval_buffer(self) -> bool:
         return True
@@ -360,12 +327,11 @@ class Points(ca.Callback):
     def has_jac_sparsity(self, output: int, of: int) -> bool:
         return True
 
-    def get_jac_sparsity(self, output: int, of: int, symmetric: bool) -> ca.Sparsity:
-        """Without it, derivatives are taken to be dense."""
+    def get_jac_sparsity(self, output: int, of: int, symmetric: bool) -> ca.Sparsity:  # without it, derivatives are taken to be dense
         return self._blocks
 
     @property
     def _blocks(self) -> ca.Sparsity:
         """A block for each point."""
-        block = ca.DM.ones(self.external.size(self.order), len(self.external.inputs))
+        block = ca.DM.ones(self.external.size[self.order], len(self.external.inputs))
         return ca.kron(ca.DM.eye(self.count), block).sparsity()

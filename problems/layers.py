@@ -37,11 +37,11 @@ class Call:
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """A Function as calls, one after the other, and what becomes of their values."""
+    """A Function as calls, each of inputs and of values of the calls before, and what becomes of all these; names as CasADi has them."""
 
     calls: tuple[Call, ...]
-    last: ca.Function  # inputs of the whole, and values of all calls -> outputs
-    names: tuple[str, list[str], list[str]]  # of the whole, its inputs and outputs
+    last: ca.Function
+    names: tuple[str, list[str], list[str]]
 
     def mapped(self, k: int) -> ca.Function:
         """The Function for k sets of inputs side by side."""
@@ -72,6 +72,7 @@ def layers_of(function: ca.Function) -> Layers | None:
     outputs = function.call(symbols, True, False)
     column = ca.cse(inlined(ca.veccat(*(one.nz[:] for one in outputs)), calls_externals))
     depths: dict[int, int] = {}
+    places: dict[tuple[int, int], ca.MX] = {}
     found: dict[tuple[int, str], list[ca.MX]] = {}
     every = nodes(column)
     for node in every:
@@ -83,7 +84,7 @@ def layers_of(function: ca.Function) -> Layers | None:
     groups = [group for _, group in sorted(found.items(), key=lambda item: item[0][0])]
     if not any(group[0].which_function().name() in EXTERNALS for group in groups):
         return None
-    arguments, values, places = [], [], {}
+    arguments, values = [], []
     for group in groups:
         one = group[0].which_function()
         arguments.append([ca.horzcat(*(ca.densify(node.dep(i)) for node in group)) for i in range(one.n_in())])

@@ -299,7 +299,8 @@ class Phase:
 
     def _expression(self, value: Any, what: str) -> ca.MX:
         groups = {"states": self._states, "controls": self._controls, "parameters": self._parameters}
-        symbols = {kind: {name: self._symbols.get(name, self._parameters.get(name)) for name in group} for kind, group in groups.items()}
+        every = self._symbols | dict(self._parameters)
+        symbols = {kind: {name: every[name] for name in group} for kind, group in groups.items()}
         value = named(value, symbols | {"time": {"time": self.time}}, what)
         own = self._hashes, {symbol.__hash__() for symbol in self._parameters.values()}
         hint = f"which is neither a state, control or time of phase '{self.name}' nor a parameter of problem '{self._problem}'"

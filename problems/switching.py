@@ -63,8 +63,8 @@ def inlined(expression: ca.MX, wanted: Callable[[ca.Function], bool] = lambda fu
     """The expression with the operations of Functions that it calls in their place, as far as they have any to show and are `wanted`."""
     flat = ("MXFunction", "SXFunction")
     while True:
-        calls = [(node, call.which_function()) for node in nodes(expression) if (call := called(node)) is not None]
-        outputs = [node for node, function in calls if function.class_name() in flat and wanted(function)]
+        every = [(node, call.which_function()) for node in nodes(expression) if (call := called(node)) is not None]
+        outputs = [node for node, function in every if function.class_name() in flat and wanted(function)]
         if not outputs:
             return expression
         calls = [node.dep(0) for node in outputs]

@@ -162,9 +162,10 @@ def _gradient(element: _Equations, tables: Tables, phase: CompiledPhase, interio
     return ca.Function("gradient", [X, right, *inputs], [gradient(ca.vec(Y), *inputs)], {"cse": symbolic})
 
 
-def elimination(sparsity: ca.Sparsity, columns: int = 1) -> ca.Function:
+def elimination(sparsity: ca.Sparsity) -> ca.Function:
     """(matrix, right) -> their solution by `eliminate`, to be called in other graphs."""
-    matrix, right = ca.SX.sym("matrix", sparsity), ca.SX.sym("right", sparsity.shape[0], columns)
+    matrix: Any = ca.SX.sym("matrix", sparsity)
+    right: Any = ca.SX.sym("right", sparsity.shape[0])
     return ca.Function("solve", [matrix, right], [ca.densify(eliminate(matrix, right))], {"cse": True})
 
 
