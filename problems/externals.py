@@ -1,8 +1,8 @@
 """Functions that CasADi cannot look into, such as a simulator written with NumPy or a table of another package, in a problem's expressions.
 
 In a graph, such a function is a call of `Points`, its derivatives too: of one point in what users state, of all at once where it is
-evaluated (`layers.py`). First derivatives are complex steps (Squire and Trapp, SIAM Review 40(1), 1998) or central differences, of all points
-in one call; second ones are differences of the first.
+evaluated (`layers.py`). First derivatives are complex steps (Squire and Trapp, SIAM Review 40(1), 1998) or central differences, of all
+points in one call; second ones are differences of the first.
 """
 
 from __future__ import annotations

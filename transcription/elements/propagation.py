@@ -112,12 +112,13 @@ def _written_out(element: _Equations, tables: Tables) -> ca.Function:
     inline = {"always_inline": isinstance(y, ca.MX)}
     whole = ca.Function("whole", list(element.symbols), [element.residual, element.rates, element.right, element.X], inline)
     jacobian = ca.Function("jacobian", list(element.symbols), [element.by_states], inline)
-    solve = elimination(jacobian.sparsity_out(0)) if isinstance(y, ca.MX) else lambda matrix, right: eliminate(ca.sparsify(matrix), right)
+    solve: Any = elimination(jacobian.sparsity_out(0)) if isinstance(y, ca.MX) else eliminate
     nq, h = len(tables.tau), others[2]
     Y = ca.repmat(left, nq, 1)
     Y = Y + h * ca.vec(whole(Y, left, *others)[1] @ ca.DM(tables.implicit))
     for _ in range(5):
-        Y = Y - solve(jacobian(Y, left, *others), whole(Y, left, *others)[0])
+        by_y = jacobian(Y, left, *others)
+        Y = Y - solve(ca.sparsify(by_y) if isinstance(by_y, ca.SX) else by_y, whole(Y, left, *others)[0])
     residual, _, right, X = whole(Y, left, *others)
     return ca.Function("step", [left, *others], [ca.densify(right), ca.densify(X), ca.mmax(ca.fabs(residual))], {"cse": True})
 
