@@ -1,6 +1,6 @@
 """Functions that CasADi cannot look into, such as a simulator written with NumPy or a table of another package, in a problem's expressions.
 
-In a graph, such a function is a call of `Points`, its derivatives too: of one point in what users state, of all at once where it is
+In a graph, such a function is a call of `ExternalPoints`, its derivatives too: of one point in what users state, of all at once where it is
 evaluated (`layers.py`). First derivatives are complex steps (Squire and Trapp, SIAM Review 40(1), 1998) or central differences, of all
 points in one call; second ones are differences of the first.
 """
@@ -18,7 +18,7 @@ import numpy as np
 
 from .switching import called
 
-EXTERNALS: dict[str, Points] = {}
+EXTERNALS: dict[str, ExternalPoints] = {}
 """By the names of their Functions. CasADi keeps none alive."""
 _raised: list[BaseException] = []
 _placeholders: dict[tuple[str, str], tuple[ca.MX, str, str]] = {}
@@ -133,7 +133,7 @@ class External:
         self.outputs: list[str] = []
         self.one_row, self.checked = False, False
         self.noise, self.spans = float(np.finfo(float).eps), np.ones(len(inputs))
-        self._made: dict[tuple[int, int], Points] = {}  # by order of derivatives and number of points
+        self._made: dict[tuple[int, int], ExternalPoints] = {}  # by order of derivatives and number of points
         self._last: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -144,9 +144,9 @@ class External:
         """How many derivatives of each order there are at a point."""
         return [len(self.outputs) * len(self.inputs) ** order for order in range(3)]
 
-    def points(self, order: int, count: int) -> Points:
+    def points(self, order: int, count: int) -> ExternalPoints:
         """The Function of derivatives of an order at so many points."""
-        return self._made.get((order, count)) or self._made.setdefault((order, count), Points(self, order, count))
+        return self._made.get((order, count)) or self._made.setdefault((order, count), ExternalPoints(self, order, count))
 
     def evaluate(self, order: int, X: np.ndarray) -> np.ndarray:
         """Derivatives of an order (k, size) at points (k, inputs), each as a column-major matrix of those of the order before."""
@@ -286,7 +286,7 @@ class External:
             raise
 
 
-class Points(ca.Callback):
+class ExternalPoints(ca.Callback):
     """Derivatives of an order of an external at several points, (inputs, count) -> (size, count)."""
 
     def __init__(self, external: External, order: int, count: int) -> None:

@@ -20,7 +20,7 @@ from .switching import inlined, nodes
 
 
 @dataclass(frozen=True, eq=False)
-class Call:
+class Layer:
     """A Function, or derivatives of an order of an external, for several sets of inputs side by side."""
 
     arguments: ca.Function  # inputs of the whole, and values of the calls before -> inputs of the call
@@ -39,7 +39,7 @@ class Call:
 class Layers:
     """A Function as calls, each of inputs and of values of the calls before, and what becomes of all these; names as CasADi has them."""
 
-    calls: tuple[Call, ...]
+    calls: tuple[Layer, ...]
     last: ca.Function
     names: tuple[str, list[str], list[str]]
 
@@ -105,7 +105,7 @@ def layers_of(function: ca.Function) -> Layers | None:
         inputs = _flat(ca.Function("arguments", known, [next(left) for _ in own]))
         points = EXTERNALS.get(one.name())
         count = len(group) * (points.count if points else 1)
-        calls.append(Call(inputs, (points.external, points.order) if points else one, count))
+        calls.append(Layer(inputs, (points.external, points.order) if points else one, count))
         known = [*known, *results]
     split = ca.vertsplit(last, np.cumsum([0, *(one.nnz() for one in outputs)]).tolist())
     whole = [ca.MX(one.sparsity(), part) for one, part in zip(outputs, split, strict=True)]
@@ -140,7 +140,7 @@ def _packed(function: ca.Function) -> tuple[Any, ...]:
     return (ca.Function.deserialize, (function.serialize(),)) if layers is None else (_whole, (layers.calls, layers.last, layers.names))
 
 
-def _whole(calls: tuple[Call, ...], last: ca.Function, names: tuple[str, list[str], list[str]]) -> ca.Function:
+def _whole(calls: tuple[Layer, ...], last: ca.Function, names: tuple[str, list[str], list[str]]) -> ca.Function:
     return Layers(calls, last, names).mapped(1)
 
 
