@@ -15,6 +15,8 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
+import cloudpickle
+
 from .cases import standard
 from .checks import unknown
 from .problem import DEFAULT_EVALUATIONS, Problem
@@ -235,10 +237,15 @@ def _file_module(place: str) -> ModuleType:
         raise ValueError(f"'{place}' is not a Python file")
     module = importlib.util.module_from_spec(spec)
     # As for a script: what stands beside the file can be imported by it, and its own classes find their module.
+    known = set(sys.modules)
     sys.modules[name] = module
     sys.path.insert(0, str(path.parent))
     try:
         spec.loader.exec_module(module)
+        for one in [other for key, other in sys.modules.items() if key not in known]:
+            # Other processes cannot import them by their names: what they define is sent as it is.
+            if Path(str(getattr(one, "__file__", None))).parent == path.parent:
+                cloudpickle.register_pickle_by_value(one)
     except BaseException as error:
         del sys.modules[name]
         if isinstance(error, SyntaxError):

@@ -56,6 +56,32 @@ def test_what_cannot_be_sent_to_other_processes_stays_in_this_one(eager, caplog)
     assert said.startswith("one process does the work, since the problem cannot be sent to others: ") and "lock" in said
 
 
+FROM_A_FILE = """
+from beside import rates
+from problems import Problem, external
+
+def build():
+    problem = Problem("sprint")
+    run = problem.phase("run", t0=0.0, tf=(1.0, 9.0))
+    run.state("x", bounds=(0, 5), initial=0, final=5)
+    run.control("u", bounds=(0, 2))
+    run.dynamics(external(rates, states=["x"], controls=["u"]))
+    problem.minimize("time", run.tf)
+    return problem
+"""
+
+
+def test_a_problem_of_a_file_goes_to_other_processes_with_what_stands_beside_it(eager, tmp_path, caplog):
+    (tmp_path / "beside.py").write_text("def rates(states, controls, parameters, time):\n    return controls - 0.1 * states**2\n")
+    (tmp_path / "mine.py").write_text(FROM_A_FILE)
+    nlp, seen = DFET(2, 2).nlp(load(f"{tmp_path / 'mine.py'}:build").compile()), dict[int, float]()
+    middle = 0.5 * (nlp.lower + nlp.upper)[None]
+    with processes(2):
+        for _ in until(lambda: len(seen) == 2):
+            seen.update(each(lambda program, k: (os.getpid(), float(program.evaluate(middle)[1][0])), nlp, [(k,) for k in range(20)]))
+    assert len(set(seen.values())) == 1 and not caplog.records
+
+
 def test_an_executor_does_all_of_the_work():
     with ThreadPoolExecutor(2) as threads, processes(threads):
         assert each(divmod, 100, [(k,) for k in range(1, 20)]) == [divmod(100, k) for k in range(1, 20)]
