@@ -10,6 +10,7 @@ import hashlib
 import math
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -151,6 +152,8 @@ class CompiledVectorProblem:
     def _sampled(self) -> tuple[np.ndarray, np.ndarray]:
         """What `rows` returns at the `sample`; NaN where it raises an error."""
         columns = (len(self.goals), len(self.limits)) if self.goals and self.limits is not None else ()
+        with suppress(Exception):
+            return self.rows(self.sample)
         return filled([self.attempt(row, "rows") for row in self.sample], columns, self.named(self.sample[0]))
 
     def attempt(self, row: np.ndarray, what: str, passing: tuple[type[Exception], ...] = ()) -> Row:

@@ -175,7 +175,8 @@ class FrontRefinement:
         self.units = np.where(np.isnan(fixed), found, fixed)
         ends = self._ends()
         between = [i for i in self.chosen if i not in ends]
-        self._refine(ends, show)
+        for i, task in ends.items():
+            self._refine({i: task}, show)  # each begins on the mesh of the one before
         F, m = self.front.F, len(self.units)
         known = [i for i in ends if i in self.found] if len(ends) == m else []
         moved = np.array([self.found[i].F for i in known]).reshape(-1, m)
