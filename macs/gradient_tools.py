@@ -33,7 +33,7 @@ from .fronts.points import Points
 from .fronts.provenance import costs
 from .fronts.verified import VERIFY, check_verify
 from .gradients.ends import ENDS, METHODS, check_points, lexicographic_ends, solve_tasks, tasks_between
-from .gradients.multistart import MultistartSolver, MultistartStopping
+from .gradients.multistart import MultistartSolver, MultistartStopping, Rules
 from .gradients.scalarised import END, MOST_ITERATIONS, WEAK, WORK, GradientSolves, Scalarised
 from .io.console import working
 from .io.workers import Workers
@@ -293,9 +293,7 @@ class _Job:
         if transcription is not None:
             self.begin(transcription)
 
-    def begin(
-        self, transcription: Transcription, ends: Points | None = None, stopping: Mapping[int, MultistartStopping] | None = None
-    ) -> None:
+    def begin(self, transcription: Transcription, ends: Points | None = None, stopping: Rules | None = None) -> None:
         """Work on this transcription from now on, with what is known of the ends on another mesh."""
         self.nlp = transcription.transcribe(self.problem)
         check_freedom(self.nlp)

@@ -10,7 +10,6 @@ import hashlib
 import math
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -152,18 +151,21 @@ class CompiledVectorProblem:
     def _sampled(self) -> tuple[np.ndarray, np.ndarray]:
         """What `rows` returns at the `sample`; NaN where it raises an error."""
         columns = (len(self.goals), len(self.limits)) if self.goals and self.limits is not None else ()
-        with suppress(Exception):
-            return self.rows(self.sample)
+        try:
+            if not self.by_row:
+                return self.rows(self.sample)
+        except Exception as error:
+            if isinstance(error, MemoryError) or is_of_statement(error):
+                raise
         return filled([self.attempt(row, "rows") for row in self.sample], columns, self.named(self.sample[0]))
 
     def attempt(self, row: np.ndarray, what: str, passing: tuple[type[Exception], ...] = ()) -> Row:
-        """What the method of this name returns for one row (d,), or the error that the user's function raised, but those `passing`."""
+        """What the method of this name returns for one row (d,), or the error that the user's function raised, but those `passing` and one
+        for want of memory."""
         try:
             return getattr(self, what)(row[None].copy())
-        except passing:
-            raise
         except Exception as error:
-            if not self.by_row and is_of_statement(error):
+            if isinstance(error, (MemoryError, *passing)) or (not self.by_row and is_of_statement(error)):
                 raise
             return f"{type(error).__name__}: {' '.join(str(error).split())}"
 

@@ -109,7 +109,7 @@ class BlackBox(Evaluator):
                     if isinstance(error, Stopped | MemoryError) or is_of_statement(error):
                         raise
                     found = []
-                found = found or each(CompiledVectorProblem.attempt, self.problem, [(row, "evaluate", (Stopped, MemoryError)) for row in Z])
+                found = found or each(CompiledVectorProblem.attempt, self.problem, [(row, "evaluate", (Stopped,)) for row in Z])
         except KeyboardInterrupt:
             raise Stopped("interrupted") from None
         self._why = {i: one for i, one in enumerate(found) if isinstance(one, str)}

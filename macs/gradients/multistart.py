@@ -12,7 +12,7 @@ Where one start alone found the best, they are not: the probability is 1 / 2 the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -112,21 +112,28 @@ class MultistartStopping:
     """Stopping rule of a multistart: the number of optima, how often the best was found, and whether the starts are enough."""
 
     def __init__(self, better: float = MULTISTART.better) -> None:
-        self._losses: list[float] = []
         self.results: list[float] = []  # losses in the order of the starts, NaN for one that ended at no optimum
-        self.starts, self.convex = 0, False  # convex: for given times, and these were tried: no start finds another optimum
+        self.convex = False  # convex: for given times, and these were tried: no start finds another optimum
         self._last, self._better, self.accuracy = 0, better, 0.0  # accuracy of losses, whatever their size: near zero that says nothing
 
     def add(self, loss: float | None) -> bool:
         """Count a solve that ended at an optimum with this loss, or at none; returns whether it is the best so far."""
-        self.starts += 1
+        known = self._losses
         self.results.append(np.nan if loss is None else loss)
         if loss is None or not np.isfinite(loss):
             return False
-        better = not self._losses or loss < min(self._losses) - MULTISTART.rounding * abs(loss)
-        self._losses.append(loss)
+        better = not known or loss < min(known) - MULTISTART.rounding * abs(loss)
         self._last = self.starts if better else self._last
         return better
+
+    @property
+    def starts(self) -> int:
+        """Solves that were counted."""
+        return len(self.results)
+
+    @property
+    def _losses(self) -> list[float]:
+        return [loss for loss in self.results if np.isfinite(loss)]
 
     @property
     def converged(self) -> int:
@@ -180,6 +187,10 @@ class MultistartStopping:
         if not len(losses):
             return 0.0
         return max(MULTISTART.same * float(np.ptp(losses)), MULTISTART.rounding * float(np.abs(losses).max()), self.accuracy)
+
+
+Rules = Mapping[int, MultistartStopping]
+"""What starts found for objectives."""
 
 
 class MultistartSolver:

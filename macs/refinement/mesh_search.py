@@ -6,7 +6,7 @@ mesh may have no feasible point, or hide the best optimum, which another mesh of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -30,7 +30,7 @@ from ..fronts.builders import certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.verified import verified
 from ..gradients.ends import lexicographic_ends
-from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, guessed_start, is_least
+from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Rules, guessed_start, is_least
 from ..gradients.scalarised import WORK, GradientSolves, LexicographicEnd, Scalarised
 from .mesh_loop import MeshLoop, Programs, Refinement, differentiable
 
@@ -402,7 +402,7 @@ class SearchMeshes:
     fine: Meshed | None  # a finer mesh, where one is needed for points that a simulation confirms
     counts: Counts  # what it cost to find out
     ends: Points | None = None  # the ends of the front, on meshes of their own
-    rules: Mapping[int, MultistartStopping] = field(default_factory=dict)  # what starts found for each objective
+    rules: Rules = field(default_factory=dict)  # what starts found for each objective
 
 
 def search_meshes(

@@ -8,10 +8,11 @@ no worse.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from transcription.nlp.derivatives import convex_objectives
 from transcription.nlp.scalarized import Solved
@@ -20,7 +21,7 @@ from transcription.stopping import stopping
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_between
-from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Starts, guessed_start
+from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Rules, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
 from ..io.workers import TOGETHER
@@ -57,15 +58,7 @@ class Opening:
     """
 
     def __init__(
-        self,
-        evaluator: Evaluator,
-        Z: np.ndarray,
-        given: int,
-        gradients: bool,
-        points: int,
-        budget: int,
-        rng: np.random.Generator,
-        rules: Mapping[int, MultistartStopping],
+        self, evaluator: Evaluator, Z: np.ndarray, given: int, gradients: bool, points: int, budget: int, rng: Generator, rules: Rules
     ) -> None:
         self._evaluator, self._Z, self._given, self._budget, self._rng, self._rules = evaluator, Z, given, budget, rng, rules
         self._points = min(points, GRADIENT_RULES.first_points)
@@ -182,7 +175,7 @@ def unsettled(starts: np.ndarray, F: np.ndarray) -> list[int]:
 
 
 def restart_solves(
-    archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, open_ends: Sequence[int], rng: np.random.Generator
+    archive: Archive, evaluator: Bilevel, points: int, count: int, drawn: int, open_ends: Sequence[int], rng: Generator
 ) -> tuple[Evaluation, np.ndarray]:
     """The results of `count` gradient solves from other starts, for points along the front and its ends in turn, fewer if asked to end
     early; and what ends were found from them, see `GradientMemory.starts`. Of three solves two are for `open_ends`; without any, one is for

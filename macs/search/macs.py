@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import inspect
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.random import Generator
 
 from problems.checks import unknown
 from problems.compiled import CompiledProblem, Objective
@@ -22,7 +23,7 @@ from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
 from ..front import Front
 from ..fronts.builders import best_rows
 from ..gradients.front_polish import polished
-from ..gradients.multistart import MultistartStopping
+from ..gradients.multistart import Rules
 from ..pareto import directions
 from ..pareto.archive import Archive
 from ..pareto.dominance import dominates, nondominated
@@ -62,12 +63,7 @@ class MACS(Settings, Solver):
             super().__init__(*args, **settings)
 
     def begin(
-        self,
-        evaluator: Evaluator,
-        budget: int | None,
-        rng: np.random.Generator,
-        start: np.ndarray | None = None,
-        rules: Mapping[int, MultistartStopping] | None = None,
+        self, evaluator: Evaluator, budget: int | None, rng: Generator, start: np.ndarray | None = None, rules: Rules | None = None
     ) -> SearchState:
         """The state of a search after its first population has been sampled, evaluated and archived.
 
@@ -139,7 +135,7 @@ class MACS(Settings, Solver):
         assign(state, self, guide)
         return state
 
-    def _first_vectors(self, evaluator: Evaluator, budget: int, rng: np.random.Generator, start: np.ndarray | None) -> np.ndarray:
+    def _first_vectors(self, evaluator: Evaluator, budget: int, rng: Generator, start: np.ndarray | None) -> np.ndarray:
         """Full vectors (k, D) of the first population: the given ones, then a Latin hypercube, within the budget."""
         box = evaluator.box
         missing = self.points_to_sample(budget) - (0 if start is None else len(start))

@@ -139,10 +139,11 @@ class Solver(SearchMethod):
         After more than ten seconds, `stats["seconds"]` has what they were spent on: search, certificates, mending, simulation, explanation.
 
         Without a number of evaluations, MACS searches in rounds, each with a polish if there are gradients and something new was found. It
-        ends when further work did not improve the front: 150 evaluations (2000 without gradients); where a later round improved the
-        front, twice as many, and at least a quarter of those before the last improvement. Later rounds begin with gradient solves from
-        other starts. At its `ceiling` a search ends, too, and after half a
-        minute or so of counted work on large programs; `stats["stopped"]` is "done" or "ceiling".
+        ends when further work did not improve the front: 150 evaluations (2000 without gradients). Where a later round improved the front,
+        or an end of it has several optima and had not starts enough, they are twice as many, and at least a quarter of those before the
+        last improvement; in the second case they take some seconds of counted work, too. Later rounds begin with gradient solves from
+        other starts. At its `ceiling` a search ends, too, and after half a minute or so of counted work on large programs;
+        `stats["stopped"]` is "done" or "ceiling".
         Improved means: points that lie beyond the front by more than 0.001 of its ranges add 0.1 % to its hypervolume, or to the best
         values of all directions on average, or one objective gets better by 0.5 % of its range. That is no proof that nothing better
         exists: what no round has come near is not found.
@@ -284,8 +285,8 @@ class Solver(SearchMethod):
         integer : bool or sequence of str
             Whether all variables, or those of these names, are whole numbers; of a pymoo Problem, beside its own. For choices: `solve`.
         seed, start, time_limit, workers, progress, callback, checkpoint
-            As for `solve`. With `workers`, also 1, the function gets one row at a time. A
-            checkpoint knows only bounds and names of a function, so the caller must pass the same function again.
+            As for `solve`. With `workers`, also 1, the function gets one row at a time. A checkpoint knows only
+            bounds and names of a function, so the caller must pass the same function again.
 
         Returns
         -------

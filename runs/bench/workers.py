@@ -44,7 +44,7 @@ def measured_calls(case: WorkersCase | str, effort: Effort, steps: Steps) -> Cal
         batches = np.array(timed[TWO][1][1])
         rounds = {f"on {count}": float(np.ceil(batches / count).sum()) for count in (1, 2, 4, 16)}
         for who, (seconds, _) in timed.items():
-            yield Row.once(case.name, who, seconds=seconds, speed=timed[ONE][0] / seconds, **rounds)
+            yield Row.once(case.name, who, seconds=seconds, speed=timed[ONE][0] / seconds, **(rounds if who == TWO else {}))
 
     return measured
 
@@ -96,8 +96,8 @@ WORKERS = Bench(
     "time, from the sizes of the batches into which the call cuts its work, whatever number there are.",
     full=Effort(
         (
-            WorkersCase("payoff of the cart-pole", partial(payoff, cart_pole(), DFET(10, 5), seed=1), 1.6),
-            WorkersCase("sweep of the cart-pole", partial(sweep, cart_pole(), DFET(10, 5), points=10, seed=1), 1.6),
+            WorkersCase("payoff of the cart-pole", lambda: payoff(cart_pole(), DFET(10, 5), seed=1), 1.6),
+            WorkersCase("sweep of the cart-pole", lambda: sweep(cart_pole(), DFET(10, 5), points=10, seed=1), 1.6),
             WorkersCase("MACS of the cart-pole", lambda: MACS().solve(cart_pole(), seed=1), 1.4),
             ASLEEP,
         ),
