@@ -15,6 +15,8 @@ from transcription.base import Transcription
 
 from .fronts import files
 from .fronts.builders import merge
+from .fronts.curve import FrontCurve, curve_of
+from .fronts.point import Point
 from .fronts.points import Points
 from .fronts.spreadsheets import save_csv
 from .fronts.tables import front_html, front_table, headline
@@ -22,6 +24,7 @@ from .fronts.verified import VERIFY, fixed_scales, simulated, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
 from .io.workers import Workers, processes
+from .pareto.dominance import nearest
 from .refinement.front_refinement import refine_mesh
 from .refinement.mending import mended
 
@@ -41,6 +44,7 @@ class Front(Points):
 
     - See: `table()`, `plot()`, `plot_trajectories()`, `plot_variables()`, `front[i].plot()`
     - Verify: `verified`, `verify()`, `simulate()`, `front[i].simulate()`
+    - Between the points: `curve()`, `knee()`
     - Improve: `mended()`, `polished()`, `refine_mesh()`
     - Combine and store: `Front.merge`, `save()`, `Front.load`, `to_csv()`, `to_xarray()`
 
@@ -250,6 +254,51 @@ class Front(Points):
         """
         return Front.of(simulated(self, problem, tolerance, rtol, atol, method))
 
+    def curve(self) -> FrontCurve:
+        """The front of two objectives as a curve through its points, with their slopes: `front.curve()(175.0)` has both objectives where
+        the first one is 175. Its `error` is estimated, its `pieces` end at kinks and gaps, and `rates` are its slopes.
+
+        Points that are not feasible, not verified (if the front was simulated), dominated, or without `weights` are left out, as the
+        curve's `message` says. Without any weights, as for a vector problem, the curve is a fit: its error is what points miss it by that
+        are left out of it, and `rates_known` is False. A front from a file has the same curve.
+
+        Returns
+        -------
+        FrontCurve
+
+        Raises
+        ------
+        ValueError
+            With more or fewer than two objectives; with fewer than two points on the front, or without weights than four.
+
+        Examples
+        --------
+        >>> import macs, problems
+        >>> front = macs.sweep(problems.load("goddard"), points=7, starts=1)
+        >>> time, speed = front.curve()(175.0)
+        >>> round(float(speed), 2)
+        0.6
+        """
+        return curve_of(self)
+
+    def knee(self) -> Point:
+        """The point nearest to the knee of `curve`: where that is farthest below the line between its ends, in ranges of the objectives
+        (Das 1999), so that little more of one objective costs much of the other on either side. It does not depend on units.
+
+        Raises
+        ------
+        ValueError
+            As for `curve`.
+
+        Examples
+        --------
+        >>> import macs, problems
+        >>> macs.sweep(problems.load("goddard"), points=7, starts=1).knee().index
+        2
+        """
+        curve = curve_of(self)
+        return self[int(nearest(curve.knee * self.signs, np.where(np.isfinite(self.F), self.F, np.inf), curve.ranges)[0])]
+
     def table(self, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
         """The front as plain text: a headline, a row for each point, those that are not verified apart, and warnings.
 
@@ -261,7 +310,7 @@ class Front(Points):
         return front_table(self, columns)
 
     def plot(self, ax: Axes | None = None, *, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
-        """Axes with the objectives: two as a scatter plot, three with the third as colour, more as parallel coordinates.
+        """Axes with the objectives: two as points on their `curve`, three with the third as colour, more as parallel coordinates.
 
         `front.plot().figure.savefig("front.png")` writes the picture to a file.
 

@@ -45,8 +45,6 @@ class ModelLimits:
 
 
 REPAIR_LIMITS, MODEL_LIMITS = RepairLimits(), ModelLimits()
-OTHERS, REPAIRED = 0, 1
-"""Rows of `SearchState.repairs`."""
 
 
 def repair(trials: Trials, seen: Sequence[Evaluation]) -> None:
@@ -64,8 +62,8 @@ def repair(trials: Trials, seen: Sequence[Evaluation]) -> None:
         _keep_residuals(state, trials, one)
     Z, F, violation = (np.concatenate([getattr(one, name) for one in usable]) for name in ("Z", "F", "violation"))
     residuals = np.concatenate([one.residuals for one in usable if one.residuals is not None])
-    rates = state.repairs.rates(prior=0.1)
-    count = max(1, min(round(rates[REPAIRED] / rates[OTHERS]), int(REPAIR_LIMITS.part * len(F))))
+    others, repaired = state.repairs.rates(prior=0.1)
+    count = max(1, min(round(repaired / others), int(REPAIR_LIMITS.part * len(F))))
     rows = _promising(state, F, violation, evaluator.tolerance)
     if len(rows) > count:
         rows = state.rng.choice(rows, count, replace=False)

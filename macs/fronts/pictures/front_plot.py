@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from itertools import cycle
 from os import PathLike
 from pathlib import Path
@@ -14,6 +15,7 @@ from problems.compiled import Objective
 
 from ...io.atomic import write_whole
 from ...io.text import counted, numbers
+from ..curve import curve_of
 from .style import (
     COLORS,
     GREY,
@@ -80,7 +82,7 @@ def _size(front: Any) -> tuple[float, float]:
 def draw_front(front: Any, ax: Axes | None = None, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
     """Axes with the objectives of a front.
 
-    One objective is drawn against the number of the point, two as a scatter plot, three with the third as colour (or in space, on 3-D
+    One objective is drawn against the number of the point, two as points on a curve, three with the third as colour (or in space, on 3-D
     Axes), more as parallel coordinates. Points that did not converge, and those that a simulation did not confirm, are hollow or broken
     lines; none of them is marked as best.
     """
@@ -137,6 +139,8 @@ def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
     axes = values.T[:2] if third else values.T
     color: dict[str, Any] = {"c": values[good, 2], "cmap": "viridis"} if third else {"color": COLORS[0]}
     shades = _shades(values[good | apart, 2]) if third and (good | apart).any() else None
+    if len(front.goals) == 2:
+        _draw_curve(front, ax)
     ax.scatter(*axes[:, good], s=26, linewidths=0.4, edgecolors="white", zorder=3, **color, norm=shades and shades.norm)
     draw_hollow(ax, axes, front, 26, shades.to_rgba(values[apart, 2]) if shades else COLORS[0])
     if shades:
@@ -151,6 +155,14 @@ def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
         ax.scatter(*axes[:, [i]], zorder=4, label=_values(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
     if len(front.goals) == 2 and good.sum() > 1 and not len(marked):
         _mark_extremes(front, ax)
+
+
+def _draw_curve(front: Any, ax: Any) -> None:
+    """Draw the curve through points with known slopes, if there is one; its gaps are gaps."""
+    with suppress(ValueError):
+        curve = curve_of(front)
+        if curve.rates_known:
+            ax.plot(*curve.sample(400).T, color=COLORS[0], lw=1.1, alpha=0.6, zorder=2)
 
 
 def _shades(values: np.ndarray) -> Any:

@@ -1,0 +1,290 @@
+"""A front of two objectives as a curve: any point between those that were solved, its rates, and an estimate of the error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from problems.compiled import Objective
+
+from ..evaluation.evaluator import CONVERGED
+from ..io.text import counted
+from ..pareto.dominance import BETTER, nondominated, separate
+from .pieces import CurvePiece, pieces
+
+GAPS = "gaps"
+"""Entry of `stats`: pairs of values of the first objective, in the user's units, between which a front has no points."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrontCurve:
+    """A front of two objectives as a curve: cubic pieces through its points and their slopes, which are the ratios of their `weights`.
+
+    Objectives, both minimised, are scaled to u in [0, 1] between the two ends of the front. The curve is a function of the place along the
+    line between the ends, s = (1 + u1 - u2) / 2, which is the parameter of Pascoletti and Serafini (1984): its value is the height
+    h = (u1 + u2 - 1) / 2 over that line. Slopes of h are in [-1, 1] also where the front is vertical or horizontal. Pieces end at kinks, as
+    where a constraint becomes active or two valleys cross, and at gaps.
+
+    Without any weights, as for a vector problem, the curve is a monotone fit: its errors are those that points have which are left out of
+    it.
+
+    Attributes
+    ----------
+    rates_known : bool
+        Whether slopes are those of the points; else they are fitted.
+    message : str
+        Which points were left out; empty if none.
+
+    Examples
+    --------
+    >>> import macs, problems
+    >>> curve = macs.sweep(problems.load("goddard"), points=7, starts=1).curve()
+    >>> curve(175.0).shape, curve.error < 1e-3, len(curve.pieces)
+    ((2,), True, 1)
+    """
+
+    goals: tuple[Objective, ...]
+    least: np.ndarray  # (2,): best values, all minimised
+    ranges: np.ndarray  # (2,)
+    parts: tuple[CurvePiece, ...]
+    rates_known: bool
+    message: str
+
+    def __repr__(self) -> str:
+        kind = "" if self.rates_known else ", fitted without rates"
+        left = f"; {self.message}" if self.message else ""
+        names = " against ".join(f"'{goal.name}'" for goal in self.goals)
+        return f"<FrontCurve: {names}, {counted(len(self.parts), 'piece')}, error about {self.error:.1e} of the ranges{kind}{left}>"
+
+    def __call__(self, value: Any, objective: str | int | None = None) -> np.ndarray:
+        """Objectives on the curve where one of them has a value.
+
+        Parameters
+        ----------
+        value : float or array (...,)
+            In the user's unit.
+        objective : str or int, optional
+            The name or number of the objective that has this value. Default: the first one.
+
+        Returns
+        -------
+        array (2,) or (..., 2)
+            In the user's units and senses; NaN off the front and in its gaps.
+
+        Raises
+        ------
+        ValueError
+            If there is no such objective.
+        """
+        return self.at_parameter(self.parameter(value, objective))
+
+    def rates(self, value: Any, objective: str | int | None = None) -> np.ndarray:
+        """How much the other objective changes along the front for a unit more of this one, where this has a value; see `TradeOffs.rate`.
+
+        Parameters
+        ----------
+        value, objective
+            As for a call.
+
+        Returns
+        -------
+        array (...,)
+            In the user's units; infinite where the front is vertical, NaN off it.
+
+        Raises
+        ------
+        ValueError
+            If there is no such objective.
+        """
+        i = self._number(objective)
+        slopes = self._at(self.parameter(value, i))[1] * (1 - 2 * i)
+        with np.errstate(divide="ignore"):
+            falls = (1.0 - slopes) / (1.0 + slopes)
+        return -falls * self.goals[0].sign * self.goals[1].sign * self.ranges[1 - i] / self.ranges[i]
+
+    @property
+    def error(self) -> float:
+        """An estimate of the largest distance of the curve from the front, along its normal, in ranges of the objectives.
+
+        It is the largest difference of interpolants of different orders, and holds where there are no kinks, gaps or valleys that no point
+        tells of. Solves on another mesh differ by what the meshes do.
+        """
+        return max((float(one.max()) for one in self.errors if len(one)), default=BETTER)
+
+    @property
+    def errors(self) -> tuple[np.ndarray, ...]:
+        """The estimates between the nodes of each piece; see `error`."""
+        return tuple(part.errors for part in self.parts)
+
+    @property
+    def pieces(self) -> np.ndarray:
+        """Objectives (k, 2, 2) at both ends of each piece, in the user's units and senses."""
+        return np.array([self._objectives(part.places[[0, -1]], part.heights[[0, -1]]) for part in self.parts])
+
+    @property
+    def intervals(self) -> np.ndarray:
+        """Places (k, 2) at which pieces begin and end, in [0, 1]."""
+        return np.array([part.interval for part in self.parts])
+
+    def sample(self, count: int = 200) -> np.ndarray:
+        """Objectives at about so many places along the curve, each piece with its ends; a row of NaN lies between pieces with a gap.
+
+        Parameters
+        ----------
+        count : int
+
+        Returns
+        -------
+        array (k, 2)
+            In the user's units and senses.
+        """
+        rows: list[np.ndarray] = []
+        for k, part in enumerate(self.parts):
+            start, end = part.interval
+            if k and start > self.parts[k - 1].interval[1]:
+                rows.append(np.full((1, 2), np.nan))
+            places = part.spread(2 + int(count * (end - start)))
+            rows.append(self._objectives(places, part(places)[0]))
+        return np.concatenate(rows)
+
+    def distances(self, objectives: np.ndarray) -> np.ndarray:
+        """Distances of points from the curve, in ranges of its objectives.
+
+        Parameters
+        ----------
+        objectives : array (n, 2)
+            In the user's units and senses.
+
+        Returns
+        -------
+        array (n,)
+        """
+        points = np.column_stack(self._placed(np.asarray(objectives, dtype=float)))[:, None]
+        found = np.full(len(points), np.inf)
+        for part in self.parts:
+            places = np.unique(np.concatenate([part.spread(2001), part.places]))
+            line = np.column_stack([places, part(places)[0]])
+            steps = np.diff(line, axis=0, append=line[-1:])
+            share = ((points - line) * steps).sum(axis=2) / np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
+            away = points - line - np.clip(share, 0.0, 1.0)[..., None] * steps
+            found = np.minimum(found, np.sqrt(2.0 * (away**2).sum(axis=2)).min(axis=1))
+        return found
+
+    @cached_property
+    def knee(self) -> np.ndarray:
+        """Objectives (2,) of the knee: the point of the curve farthest below the line between its ends, in ranges (Das, "On characterizing
+        the 'knee' of the Pareto curve based on normal-boundary intersection", Structural Optimization 18, 1999)."""
+        places = np.concatenate([part.spread(2001) for part in self.parts])
+        return self.at_parameter(places[np.nanargmin(self._at(places)[0])])
+
+    def parameter(self, value: Any, objective: str | int | None = None) -> np.ndarray:
+        """Places (...,) where an objective has a value, as for a call; NaN off the front and in its gaps."""
+        i = self._number(objective)
+        u = (np.asarray(value, dtype=float) * self.goals[i].sign - self.least[i]) / self.ranges[i]
+        found = np.full(u.shape, np.nan)
+        for part in self.parts:
+            # What rounding leaves beyond the ends belongs to them.
+            low, high = sorted(_scaled(part.places[[0, -1]], part.heights[[0, -1]])[..., i])
+            here = (u >= low - 1e-9) & (u <= high + 1e-9)
+            start, end = (np.full(u.shape, one) for one in part.interval)
+            for _ in range(60):
+                middle = 0.5 * (start + end)
+                after = (_scaled(middle, part(middle)[0])[..., i] < u) == (i == 0)
+                start, end = np.where(after, middle, start), np.where(after, end, middle)
+            found = np.where(here, 0.5 * (start + end), found)
+        return found
+
+    def at_parameter(self, places: Any) -> np.ndarray:
+        """Objectives (..., 2) at places (...,), in the user's units and senses; NaN off the front and in its gaps."""
+        places = np.asarray(places, dtype=float)
+        return self._objectives(places, self._at(places)[0])
+
+    def _at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and slopes (...,) at places; NaN where there are none."""
+        heights, slopes = np.full(np.shape(places), np.nan), np.full(np.shape(places), np.nan)
+        for part in self.parts:
+            start, end = part.interval
+            here = (places >= start) & (places <= end)
+            found = part(np.clip(places, start, end))
+            heights, slopes = np.where(here, found[0], heights), np.where(here, found[1], slopes)
+        return heights, np.clip(slopes, -1.0, 1.0)
+
+    def _objectives(self, places: np.ndarray, heights: np.ndarray) -> np.ndarray:
+        """Objectives (..., 2), in the user's units and senses, of places and heights."""
+        return (self.least + self.ranges * _scaled(places, heights)) * np.array([goal.sign for goal in self.goals])
+
+    def _placed(self, objectives: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places and heights of objectives (n, 2) in the user's units and senses."""
+        return placed((objectives * np.array([goal.sign for goal in self.goals]) - self.least) / self.ranges)
+
+    def _number(self, objective: str | int | None) -> int:
+        names = [goal.name for goal in self.goals]
+        if objective in (None, *range(2)):
+            return int(objective or 0)
+        if objective in names:
+            return names.index(str(objective))
+        raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
+
+
+def placed(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places and heights (...,) of objectives (..., 2) in ranges."""
+    return 0.5 * (1.0 + u[..., 0] - u[..., 1]), 0.5 * (u[..., 0] + u[..., 1] - 1.0)
+
+
+def _scaled(places: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Objectives (..., 2) in ranges, of places and heights."""
+    return np.stack([places + heights, 1.0 - places + heights], axis=-1)
+
+
+def slopes(weights: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Slopes (...,) of a front at points whose objectives have these weights (..., 2)."""
+    worth = weights * ranges
+    with np.errstate(invalid="ignore"):
+        return (worth[..., 1] - worth[..., 0]) / worth.sum(axis=-1)
+
+
+def curve_of(front: Any) -> FrontCurve:
+    """The curve of a front; see `Front.curve`."""
+    if len(front.goals) != 2:
+        names = ", ".join(f"'{name}'" for name in front.names)
+        raise ValueError(f"a curve is a front of two objectives, and this one has {len(front.goals)}: {names}")
+    weights = np.array([np.full(2, np.nan) if one is None else one.weights for one in front.costates]).reshape(-1, 2)
+    kept, left = np.ones(len(front), dtype=bool), list[str]()
+    rates_known = ~np.isnan(weights).any(axis=1)
+    for word, good in (
+        ("not feasible", (front.status == CONVERGED) & np.isfinite(front.F).all(axis=1)),
+        ("not verified", front.verified | ~front.was_simulated),
+        ("without weights", rates_known | ~rates_known.any()),
+        ("dominated or equal", None),
+    ):
+        if good is None:
+            good = np.zeros(len(front), dtype=bool)
+            good[kept] = _alone(front.F[kept])
+        left += [f"{np.count_nonzero(kept & ~good)} {word}"] if (kept & ~good).any() else []
+        kept &= good
+    message = f"of {counted(len(front), 'point')} left out: {', '.join(left)}" if left else ""
+    least = 2 if rates_known.any() else 4
+    if kept.sum() < least:
+        rest = f"; {message or front.message}".rstrip("; ")
+        raise ValueError(
+            f"a curve needs {least} points of the front at least, and there {'is' if kept.sum() == 1 else 'are'} {kept.sum()}{rest}"
+        )
+    F, weights = front.F[kept], weights[kept]
+    best, ranges = F.min(axis=0), np.ptp(F, axis=0)
+    s, h = placed((F - best) / ranges)
+    order = np.argsort(s)
+    gaps = front.signs[0] * np.array(front.stats.get(GAPS, [])).reshape(-1, 2).mean(axis=1)
+    parts = pieces(s[order], h[order], slopes(weights, ranges)[order], np.searchsorted(F[order, 0], gaps).tolist())
+    return FrontCurve(front.goals, best, ranges, tuple(parts), bool(rates_known.any()), message)
+
+
+def _alone(F: np.ndarray) -> np.ndarray:
+    """Mask (n,) of points that no other dominates or equals, to the accuracy of solves."""
+    kept = np.zeros(len(F), dtype=bool)
+    if len(F):
+        rows = np.flatnonzero(nondominated(F))
+        kept[rows[separate(F[rows], np.ptp(F[rows], axis=0))]] = True
+    return kept

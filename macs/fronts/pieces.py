@@ -1,0 +1,272 @@
+"""Cubic pieces through points of a curve and its slopes: where they end, and an estimate of their error.
+
+Places s lie along the line between the ends of a front, heights h across it, both in ranges of the objectives; a front has slopes h' in
+[-1, 1]. Between neighbours the curve is the cubic Hermite interpolant. What it errs by is estimated from the quintics that also go through
+the next point on either side. Pieces end where the curve has a kink, such as the corner that a new constraint makes or the crossing of two
+valleys, or a gap, where what goes on is dominated. A break is accepted where both sides, extrapolated, explain the points by far better
+than one smooth curve does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ..pareto.dominance import BETTER
+
+Polynomial = Callable[[np.ndarray | float], tuple[np.ndarray, np.ndarray]]
+"""Heights and slopes at places."""
+
+
+@dataclass(frozen=True)
+class FitLimits:
+    """When something else explains points better than a smooth curve with their slopes."""
+
+    better: float = 0.1  # part of the error of a smooth curve that a break may leave
+    unsure: float = 4.0  # multiple of what its prediction is unsure by, by which a slope at an end differs if it is one of several
+
+
+FIT = FitLimits()
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePiece:
+    """A smooth piece of a curve: k nodes in the order of their places. It may be one point."""
+
+    places: np.ndarray  # (k,)
+    heights: np.ndarray  # (k,)
+    slopes: np.ndarray  # (k,)
+    errors: np.ndarray  # (k - 1,): estimates of the largest distance between neighbours, along the normal
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Places at which it begins and ends."""
+        return float(self.places[0]), float(self.places[-1])
+
+    def spread(self, count: int) -> np.ndarray:
+        """So many places, evenly between its ends (count,)."""
+        return np.linspace(self.places[0], self.places[-1], count)
+
+    def __call__(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heights and slopes at places within the piece, any shape."""
+        if len(self.places) == 1:
+            return np.full(np.shape(places), self.heights[0]), np.full(np.shape(places), self.slopes[0])
+        i = np.clip(np.searchsorted(self.places, places, side="right") - 1, 0, len(self.places) - 2)
+        length = self.places[i + 1] - self.places[i]
+        t, rise = (places - self.places[i]) / length, self.heights[i + 1] - self.heights[i]
+        first, last = self.slopes[i] * length - rise, rise - self.slopes[i + 1] * length
+        heights = self.heights[i] + t * rise + t * (1 - t) * ((1 - t) * first + t * last)
+        slopes = rise + (1 - 2 * t) * ((1 - t) * first + t * last) + t * (1 - t) * (last - first)
+        return heights, slopes / length
+
+
+def distance(heights: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Distances along the normal, in ranges, for differences in height of a curve with these slopes."""
+    return np.sqrt(2.0 / (1.0 + slopes**2)) * np.abs(heights)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """Points that may be on one smooth curve, with slopes, NaN where unknown; at its sides the edges of its piece beyond, as a place,
+    height, slope and error each."""
+
+    s: np.ndarray
+    h: np.ndarray
+    d: np.ndarray
+    before: tuple[float, float, float, float] | None = None
+    after: tuple[float, float, float, float] | None = None
+    inferred: tuple[int, ...] = ()  # the points whose slopes follow from those beside
+
+    def through(self, *points: int, free: Sequence[int] = ()) -> Polynomial:
+        """The polynomial through points and their slopes, but for those of the points `free`."""
+        i = np.array(points)
+        return _through(self.s[i], self.h[i], np.where(np.isin(i, free), np.nan, self.d[i]))
+
+    def known(self) -> _Run:
+        """The same with a slope at each point: those that are unknown, and those at its sides that the points beside contradict, from the
+        points beside."""
+        d, n = self.d.copy(), len(self.s)
+        run, inferred = _Run(self.s, self.h, d), np.flatnonzero(np.isnan(d)).tolist()
+        for i in inferred:
+            near = [j for j in (i - 1, i, i + 1) if 0 <= j < n]
+            d[i] = np.clip(run.through(*near, free=[i])(self.s[i])[1], -1.0, 1.0)
+        for i, step in ((0, 1), (n - 1, -1)) if n > 2 else ():
+            likely, rough = (float(run.through(*near, free=[i])(self.s[i])[1]) for near in ((i, i + step, i + 2 * step), (i, i + step)))
+            if abs(d[i] - likely) > FIT.unsure * abs(likely - rough):
+                d[i] = np.clip(likely, -1.0, 1.0)
+                inferred.append(i)
+        return _Run(self.s, self.h, d, self.before, self.after, tuple(inferred))
+
+    def error(self, i: int) -> float:
+        """The estimated error between points i and i + 1."""
+        n, cubic = len(self.s), self.through(i, i + 1)
+        rivals = [self.through(j, i, i + 1) for j in (i - 1, i + 2) if 0 <= j < n]
+        # At a side, also what one without the slope there would be, which may be one of several.
+        for side, *more in ((0, 1, 2), (n - 1, n - 2, n - 3)) if n > 2 else ():
+            if side in (i, i + 1):
+                rivals.append(self.through(side, *more, free=[side, more[1]] if side in self.inferred else [side]))
+        # Of two points alone: what one without either slope would be.
+        rivals = rivals or [self.through(i, i + 1, free=[j]) for j in (i, i + 1)]
+        return _apart(cubic, rivals, self.s[i], self.s[i + 1])
+
+    def side(self, i: int, step: int) -> tuple[Polynomial, Polynomial]:
+        """The polynomial through points i and up to two further ones on its side, to be extrapolated, and one of a lower degree."""
+        near, third = [i, i + step], i + 2 * step
+        if 0 <= third < len(self.s):
+            return self.through(*near, third), self.through(*near)
+        return self.through(*near), self.through(*near, free=[i + step])
+
+    def piece(self) -> CurvePiece:
+        """The piece of the curve."""
+        run = self.known()
+        errors = [run.error(i) for i in range(len(run.s) - 1)]
+        nodes = [*zip(run.s, run.h, run.d, strict=True)]
+        if self.before is not None and self.before[0] < self.s[0]:
+            nodes, errors = [self.before[:3], *nodes], [self.before[3], *errors]
+        if self.after is not None and self.after[0] > self.s[-1]:
+            nodes, errors = [*nodes, self.after[:3]], [*errors, self.after[3]]
+        places, heights, slopes = np.array(nodes).T
+        return CurvePiece(places, heights, slopes, np.array(errors))
+
+
+def pieces(s: np.ndarray, h: np.ndarray, d: np.ndarray, first: Sequence[int] = ()) -> list[CurvePiece]:
+    """The pieces of the curve through points with places in ascending order, heights and slopes (n,), which may be NaN where unknown.
+    Before the points `first` there are gaps."""
+    if np.isnan(d).all():
+        return [_fitted(s, h)]
+    ends = [0, *sorted(set(first) - {0, len(s)}), len(s)]
+    runs = [_Run(s[a:b], h[a:b], d[a:b]) for a, b in pairwise(ends)]
+    return [part.piece() for run in runs for part in _split(run)]
+
+
+def _fitted(s: np.ndarray, h: np.ndarray) -> CurvePiece:
+    """A monotone cubic through points without slopes (Fritsch and Carlson 1980); its errors are those at the points beside, left out."""
+    missed = np.zeros(len(s))
+    for i in range(1, len(s) - 1):
+        height, slope = CurvePiece(np.delete(s, i), np.delete(h, i), _monotone(np.delete(s, i), np.delete(h, i)), np.empty(0))(s[i])
+        missed[i] = distance(h[i] - height, slope)
+    missed[[0, -1]] = missed[[1, -2]]
+    return CurvePiece(s, h, _monotone(s, h), np.maximum(missed[1:], missed[:-1]) + BETTER)
+
+
+def _monotone(s: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Slopes (n,) of parabolas through neighbours, limited so that both objectives are monotone in between."""
+    chords = np.diff(h) / np.diff(s)
+    beside = np.stack([np.r_[chords[0], chords], np.r_[chords, chords[-1]]])
+    lengths = np.r_[np.diff(s)[0], np.diff(s), np.diff(s)[-1]]
+    slopes = (beside[0] * lengths[1:] + beside[1] * lengths[:-1]) / (lengths[1:] + lengths[:-1])
+    return np.clip(
+        slopes, np.maximum(-1.0, 1.0 - 3.0 * (1.0 - beside.max(axis=0))), np.minimum(1.0, 3.0 * (1.0 + beside.min(axis=0)) - 1.0)
+    )
+
+
+def _split(run: _Run) -> list[_Run]:
+    """The run as the smooth parts of the curve."""
+    n = len(run.s)
+    if n < 4:
+        return [run]
+    known = run.known()
+    errors = np.array([known.error(i) for i in range(n - 1)])
+    best: tuple[float, list[_Run]] = (FIT.better, [])
+    for i in range(1, n - 2):
+        best = min(best, _between(run, known, i, errors[i]), key=lambda one: one[0])
+    for i in range(2, n - 2):
+        best = min(best, _at_point(run, known, i, max(errors[i - 1], errors[i])), key=lambda one: one[0])
+    return [run] if not best[1] else [part for one in best[1] for part in _split(one)]
+
+
+def _between(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list[_Run]]:
+    """What a break between points i and i + 1 leaves of the error of a smooth curve, and the two parts."""
+    nothing = np.inf, list[_Run]()
+    if smooth <= 10 * BETTER:
+        return nothing
+    start, end = known.s[i], known.s[i + 1]
+    (left, left_rival), (right, right_rival) = known.side(i, -1), known.side(i + 1, 1)
+    places = np.linspace(start, end, 257)
+    # Beyond where it is horizontal or vertical in the objectives, a side is dominated: what follows there is a gap.
+    a, b = _admissible(left, places), _admissible(right, places[::-1])
+    lower = np.where(places <= a, left(places)[0], left(a)[0] + places - a)
+    upper = np.where(places >= b, right(places)[0], right(b)[0] + b - places)
+    (crossings,) = np.nonzero(np.diff(np.sign(lower - upper)) != 0)
+    if len(crossings) != 1:
+        return nothing
+    k = crossings[0]
+    # Where a constraint takes over from another, both sides would be lower beyond their corner: it is where they cross themselves.
+    corner = lower[k] > upper[k]
+    difference = left(places)[0] - right(places)[0] if corner else lower - upper
+    place = places[k] + (places[k + 1] - places[k]) * difference[k] / (difference[k] - difference[k + 1])
+    to = (place, place) if corner else (min(place, a), max(place, b))
+    edges = []
+    for one, rival, begin, until in ((left, left_rival, start, to[0]), (right, right_rival, end, to[1])):
+        height, slope = one(until)
+        error = _apart(one, [rival], *sorted((begin, until)))
+        edges.append((float(until), float(height), float(np.clip(slope, -1.0, 1.0)), error))
+    if abs(edges[0][2] - edges[1][2]) < 0.5 * abs(known.d[i + 1] - known.d[i]) + BETTER and to[0] == to[1]:  # no kink
+        return nothing
+    parts = [
+        _Run(run.s[: i + 1], run.h[: i + 1], run.d[: i + 1], run.before, edges[0]),
+        _Run(run.s[i + 1 :], run.h[i + 1 :], run.d[i + 1 :], edges[1], run.after),
+    ]
+    return max(edge[3] for edge in edges) / smooth, parts
+
+
+def _admissible(one: Polynomial, places: np.ndarray) -> float:
+    """The place up to which a side, extrapolated, is not dominated by itself."""
+    left = 1.0 - np.sign(places[-1] - places[0]) * one(places)[1]
+    (beyond,) = np.nonzero(left <= 0.0)
+    if not len(beyond) or not beyond[0]:
+        return float(places[beyond[0]] if len(beyond) else places[-1])
+    k = beyond[0]
+    return float(places[k - 1] + (places[k] - places[k - 1]) * left[k - 1] / (left[k - 1] - left[k]))
+
+
+def _at_point(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list[_Run]]:
+    """The same for a break at point i, whose slope may be one of several; or, without a jump, the run without that slope."""
+    if smooth <= 10 * BETTER:
+        return np.inf, []
+    slopes, unsure = [], []
+    for step in (-1, 1):
+        near, far = i + step, i + 2 * step
+        likely, rough = known.through(far, near, i, free=[i]), known.through(near, i, free=[i])
+        slopes.append(float(likely(known.s[i])[1]))
+        unsure.append(_apart(likely, [rough], *sorted((known.s[near], known.s[i]))))
+    left = max(unsure) / smooth
+    # Where the slope there differs from both sides by more than they differ, it is wrong.
+    if abs(slopes[1] - slopes[0]) < min(abs(run.d[i] - slopes[0]), abs(run.d[i] - slopes[1])):
+        d = run.d.copy()
+        d[i] = np.nan
+        return (np.inf, []) if np.isnan(run.d[i]) else (left, [_Run(run.s, run.h, d, run.before, run.after)])
+    d, e = run.d[: i + 1].copy(), run.d[i:].copy()
+    d[-1], e[0] = np.clip(slopes, -1.0, 1.0)
+    return left, [_Run(run.s[: i + 1], run.h[: i + 1], d, run.before), _Run(run.s[i:], run.h[i:], e, None, run.after)]
+
+
+def _apart(one: Polynomial, others: Sequence[Polynomial], start: float, end: float) -> float:
+    """The distances of a polynomial from others between two places, added up, and what solves leave."""
+    places = np.linspace(start, end, 17)
+    heights, slopes = one(places)
+    slopes = np.clip(slopes, -1.0, 1.0)
+    return BETTER + sum(float(distance(heights - other(places)[0], slopes).max()) for other in others)
+
+
+def _through(s: np.ndarray, h: np.ndarray, d: np.ndarray) -> Polynomial:
+    """The polynomial through heights and slopes, where these are known, at places, by divided differences."""
+    repeated = np.repeat(np.arange(len(s)), 1 + ~np.isnan(d))
+    nodes, column = s[repeated], h[repeated]
+    coefficients = [column[0]]
+    for k in range(1, len(nodes)):
+        length = nodes[k:] - nodes[:-k]
+        column = np.where(length != 0, np.diff(column) / np.where(length == 0, 1.0, length), d[repeated[k:]])
+        coefficients.append(column[0])
+
+    def at(places: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+        height, slope = np.zeros(np.shape(places)), np.zeros(np.shape(places))
+        for coefficient, node in zip(coefficients[::-1], nodes[::-1], strict=True):
+            slope = slope * (places - node) + height
+            height = height * (places - node) + coefficient
+        return height, slope
+
+    return at
