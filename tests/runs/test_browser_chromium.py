@@ -54,6 +54,17 @@ def test_a_click_selects_a_point_and_shows_its_trajectory(browser, tmp_path):
     assert errors(browser) == []
 
 
+def test_a_page_opens_with_the_knee_and_its_trajectory(browser, tmp_path):
+    front = flights(5, F=np.array([[1.0, 5.0], [2.0, 1.5], [3.0, 1.2], [4.0, 1.1], [5.0, 1.0]]))
+    for knee, verified in ((1, [True] * 5), (2, [True, False, True, True, True])):
+        show(browser, tmp_path, front_page(marked(front, verified)))
+        wait(browser, "document.getElementById('flights').dataset.drawn === state.selected")
+        assert browser.execute_script("return selectedPoint().index") == knee
+    show(browser, tmp_path, front_page(black_box(5, 3)))
+    assert browser.execute_script("return tableOrder().indexOf(selectedPoint())") == 2
+    assert errors(browser) == []
+
+
 @pytest.mark.slow
 def test_rows_are_reached_and_selected_by_keys_and_sorted_by_titles(browser, tmp_path):
     from selenium.webdriver.common.keys import Keys

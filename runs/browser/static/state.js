@@ -26,10 +26,10 @@ function take(comparison) {
   state.byKey = new Map(state.points.map((point) => [point.key, point]));
 }
 
-/** Show a comparison from its beginning: nothing selected, nothing hidden. */
+/** Show a comparison from its beginning: a point in the middle selected, nothing hidden. */
 function showComparison(comparison) {
   take(comparison);
-  Object.assign(state, { selected: null, kept: [], ranges: comparison.goals.map(() => null), hidden: new Set(), run: "" });
+  Object.assign(state, { selected: opening()?.key ?? null, kept: [], ranges: comparison.goals.map(() => null), hidden: new Set(), run: "" });
   emit("comparison");
 }
 
@@ -89,6 +89,20 @@ const statusOf = (point) => {
   if (point.status !== "converged" || point.verified === null) return point.status;
   return point.verified ? "verified" : "not verified";
 };
+
+/**
+ * The point that a page opens with. Of two objectives it is the knee: the farthest, in ranges, from the line between the ends; else it is the
+ * middle one by the first objective.
+ */
+function opening() {
+  const good = state.points.filter(counts);
+  const points = [...(good.length ? good : state.points)].sort((a, b) => a.values[0] - b.values[0]);
+  if (state.comparison.goals.length !== 2 || points.length < 3) return points[points.length >> 1];
+  const ends = [points[0], points.at(-1)];
+  const [width, height] = [0, 1].map((i) => ends[1].values[i] - ends[0].values[i] || 1);
+  const off = ({ values }) => Math.abs((values[0] - ends[0].values[0]) / width - (values[1] - ends[0].values[1]) / height);
+  return points.reduce((best, point) => (off(point) > off(best) ? point : best));
+}
 
 /** Whether a point's solver and run are shown. */
 const isShown = (point) => !state.hidden.has(point.solver) && (state.run === "" || String(point.run.number) === state.run);
