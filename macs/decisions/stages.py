@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,10 +20,11 @@ from transcription.stopping import Stopped
 from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import certified, from_vectors
 from ..fronts.points import Points
-from ..fronts.provenance import costs
+from ..fronts.provenance import COUNTED_BY, costs
 from ..fronts.verified import unmarked
 from ..gradients.multistart import MultistartSolver
 from ..gradients.scalarised import WORK, GradientSolves, Scalarised
+from ..io.interrupts import spending
 from ..preferences.stage import Stage, no_limits
 from ..refinement.mending import resolve_unverified
 from ..refinement.mesh_loop import MeshLoop, Programs
@@ -91,6 +93,7 @@ class StageSolver:
         # By how many times their ranges objectives may leave these, and all values that are known.
         self._room = np.full(len(best), 10.0)
 
+    @spending("stages")
     def on_mesh(self, stage: Stage, kept: Sequence[StageBound], known: StartVectors, starts: int) -> StageSolution:
         """The best result of so many starts on the transcription of the known vectors; the first are these, others are random."""
         for widened in range(WIDENINGS + 1):
@@ -103,6 +106,7 @@ class StageSolver:
             known = solution.known
         return solution
 
+    @spending("stages")
     def on_found_mesh(
         self, stage: Stage, meshes: Sequence[Meshed], known_on: Callable[[Meshed], StartVectors], starts: int, verify: float
     ) -> StageSolution:
@@ -165,6 +169,7 @@ class StageSolver:
         point = from_vectors(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
         found = resolve_unverified(point if among is None else unmarked(Points.concatenate([point, among])), verify)
         spent = {key: found.stats[key] for key in ("gradient_solves", "inner_iterations", "work", "gradient_work")}
+        spent |= {key: Counter(found.stats[key]) for key in COUNTED_BY}
         self.solves.counts = self.solves.counts.joined(Counts(**spent, clocked=int(not found.stats["reproducible"])))
         first, method = found[0], from_dict(found[0].transcription or {})
         if method == nlp.transcription and np.array_equal(first.decision, z):

@@ -19,6 +19,7 @@ from problems.checks import short_repr
 from problems.compiled import Objective
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
+from ..io.interrupts import purpose
 from ..io.text import counted
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
@@ -216,6 +217,10 @@ class Counts:
     gradient_work: int = 0  # part of the work that gradient solves took
     solved: int = 0  # gradient solves that converged, each by itself or all of a batch, and their iterations
     solved_iterations: int = 0
+    # By what they were for, see `spending`: gradient solves, their iterations, and those that gave a new point or a better one.
+    solves_for: Counter[str] = field(default_factory=Counter)
+    iterations_for: Counter[str] = field(default_factory=Counter)
+    kept_for: Counter[str] = field(default_factory=Counter)
     first_failure: str = ""  # of an evaluation of a vector problem: the error, and the design
 
     __repr__ = short_repr
@@ -224,6 +229,8 @@ class Counts:
         """Count gradient solves with their statuses and iterations, of programs with so many variables; `clocked` of them were ended early
         by a time limit."""
         self.gradient_solves += count
+        self.solves_for += Counter({purpose(): count})
+        self.iterations_for += Counter({purpose(): iterations})
         self.failures.update(one for one in status if one != CONVERGED)
         self.inner_iterations += iterations
         self.clocked += clocked
@@ -232,6 +239,10 @@ class Counts:
         if all(one == CONVERGED for one in status):
             self.solved += count
             self.solved_iterations += iterations
+
+    def keep(self, results: Any) -> None:
+        """Count gradient solves that gave a new point or a better one: a number or a mask."""
+        self.kept_for += Counter({purpose(): int(np.sum(results))})
 
     def joined(self, other: Counts) -> Counts:
         """The sums of these and other costs."""

@@ -92,6 +92,9 @@ class Stats(TypedDict, total=False):
     gradient_solves: Required[Count]
     fallbacks: Required[Count]  # candidates that went to IPOPT, because the fast inner level failed
     failures: Required[dict[str, Count]]  # by status
+    solves_for: dict[str, Count]  # solves_for, iterations_for, kept_for: see `Counts`
+    iterations_for: dict[str, Count]
+    kept_for: dict[str, Count]
     wall_time: Required[Amount]  # s
     seed: Required[int | list[int | None] | None]  # of merged fronts several
     tolerance: Required[Amount]  # of violations
@@ -132,12 +135,15 @@ def _version(package: str) -> str:
 
 COUNTED = ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "work", "gradient_work")
 """Fields of `Counts` that are entries of `stats`."""
+COUNTED_BY = ("solves_for", "iterations_for", "kept_for")
+"""The same, by what gradient solves were for."""
 
 
 def costs(counts: Counts, **about: Any) -> dict[str, Any]:
     """`stats` of a front from the counts of a run, with `about`: `wall_time`, `seed`, `tolerance` and more."""
     first = {"first_failure": counts.first_failure} if counts.first_failure else {}
-    return {**{key: getattr(counts, key) for key in COUNTED}, "failures": dict(counts.failures), **first, **about}
+    by = {key: dict(getattr(counts, key)) for key in (*COUNTED_BY, "failures")}
+    return {**{key: getattr(counts, key) for key in COUNTED}, **by, **first, **about}
 
 
 def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopped: str) -> dict[str, Any]:
@@ -146,6 +152,7 @@ def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopp
     return {
         **stats,
         **{key: stats.get(key, 0) + getattr(counts, key) for key in added},
+        **{key: dict(Counter(stats.get(key, {})) + getattr(counts, key)) for key in COUNTED_BY},
         "wall_time": stats["wall_time"] + wall_time,
         "reproducible": stats["reproducible"] and not (counts.clocked or stopped),
         **({"stopped": stopped} if stopped else {}),
@@ -162,7 +169,7 @@ def merged_stats(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             found.setdefault(package, {})[number] = None
     return {
         **{key: sum(stats.get(key, 0) for stats in several) for key in (*COUNTED, "wall_time")},
-        "failures": dict(sum((Counter(stats["failures"]) for stats in several), Counter())),
+        **{key: dict(sum((Counter(stats.get(key, {})) for stats in several), Counter())) for key in (*COUNTED_BY, "failures")},
         "seed": seeds if len(seeds) > 1 else seeds[0],
         "tolerance": max(stats["tolerance"] for stats in several),
         "reproducible": all(stats["reproducible"] for stats in several),
@@ -213,7 +220,7 @@ def read_stats(attrs: Mapping[str, Any]) -> dict[str, Any]:
     """`stats` from its attributes. Raises ValueError for what it cannot be."""
     stats = {**read_document(attrs, "stats"), "versions": read_document(attrs, "versions")}
     stats |= {name: bool(attrs[name]) if isinstance(usual, bool) else attrs[name] for name, usual in STATS.items() if name in attrs}
-    stats |= {name: _whole(stats[name]) for name in (*COUNTED, "failures", "seed") if name in stats}
+    stats |= {name: _whole(stats[name]) for name in (*COUNTED, *COUNTED_BY, "failures", "seed") if name in stats}
     try:
         msgspec.convert(stats, Stats)
     except msgspec.ValidationError as error:

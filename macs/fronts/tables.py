@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from ..evaluation.evaluator import CONVERGED, FAILED
 from ..io.text import call, counted, duration, html_block, html_table, numbers, text_table
 from .point import Point
 from .points import Points
+from .provenance import COUNTED_BY
 from .verified import AGAIN, MISSES, constant_objectives, missed, untrusted
 
 
@@ -128,6 +130,14 @@ def headline(front: Points) -> str:
         duration(front.stats["wall_time"]),
     ]
     return f"{front.source.name if front.source else 'black box'}: " + ", ".join(part for part in parts if part)
+
+
+def solves_table(front: Points) -> str:
+    """What gradient solves were for, see `Counts`: those with most iterations first; "" where there were none."""
+    solves, iterations, _ = by = [Counter(front.stats.get(key, {})) for key in COUNTED_BY]
+    names = [what for what, _ in iterations.most_common() if solves[what]]
+    rows = [[what, *(str(one[what]) for one in by)] for what in names] + [["all", *(str(one.total()) for one in by)]]
+    return text_table([("gradient solves for", "number", "iterations", "kept")], rows, [True, False, False, False]) if solves else ""
 
 
 def _transcribed(front: Points) -> str:

@@ -13,6 +13,7 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED
+from ..io.interrupts import spending
 from ..io.workers import TOGETHER
 from ..pareto.directions import divisions_below, simplex_lattice
 from .multistart import MULTISTART, MultistartSolver
@@ -38,6 +39,7 @@ class EndsLimits:
 ENDS = EndsLimits()
 
 
+@spending("ends")
 def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved] | None = None, most: float = np.inf) -> list[Solved]:
     """The lexicographic optimum of each objective, from its optimum alone, `single(i)`, and from the ends of the others, which may lie in
     other valleys: its least value, then those of the others in their order, without a loss in those before, or one of
@@ -54,7 +56,8 @@ def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved]
             _from_each_other(solver, optima, tried)
             for i in range(m):
                 if optima[i] is not ends[i]:
-                    ends[i] = _lexicographic(solver, i, optima)
+                    ends[i] = end = _lexicographic(solver, i, optima)
+                    solver.solves.counts.keep(end is not optima[i] and end.message != WEAK)
             if all(one is end for one, end in zip(optima, ends, strict=True)):
                 break
             optima = [end for end in ends if end is not None]
@@ -83,6 +86,7 @@ def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict
                 gain = max(ENDS.gain * scales[i], 2 * END.slack * spans[i])
                 if solved.status == CONVERGED and (optima[i].status != CONVERGED or optima[i].F[i] - solved.F[i] > gain):
                     optima[i] = solved
+                    solver.solves.counts.keep(1)
         if all(one is other for one, other in zip(before, optima, strict=True)):
             break
 
@@ -123,6 +127,7 @@ def _spans(optima: Sequence[Solved]) -> np.ndarray:
     return np.ptp([one.F for one in optima if one.status == CONVERGED], axis=0)
 
 
+@spending("points between")
 def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[Solved]:
     """The results of all tasks: also from results of others that are better for them and, with several starts, from that of
     the next one; with as many starts as pay, from others in turn, as long as these find better ones and take no more work than the
@@ -135,7 +140,7 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
     found = [found[k // 2 + half * (k % 2)] for k in range(len(tasks))]
     if (solver.starts or 1) > 1:
         for k in range(len(tasks) - 2, -1, -1):
-            found[k] = min(found[k], solver.from_vector(found[k + 1].z, tasks[k]), key=tasks[k].rank)
+            found[k] = solver.better(found[k], solver.from_vector(found[k + 1].z, tasks[k]), tasks[k])
     _from_rivals(solver, tasks, found)
     if solver.starts is None:
         limit = solver.solves.counts.work + max(WORK.little, solver.solves.counts.work - before)
@@ -148,6 +153,7 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
             if solved.status == CONVERGED and solved.multipliers is not None:
                 weights, tolerance = solved.multipliers[: len(ranges)], solver.solves.tolerance
                 found[k] = strongly_optimal(solver.from_vector, tolerance, solved, weights, ranges)
+                solver.solves.counts.keep(found[k] is not solved)
     return found
 
 
@@ -159,6 +165,7 @@ def _from_rivals(solver: MultistartSolver, tasks: Sequence[Scalarised], found: l
             break
 
 
+@spending("starts")
 def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], found: list[Solved], limit: float) -> bool:
     """Solve each task from another start; returns whether any result was replaced."""
     replaced = False
@@ -171,6 +178,7 @@ def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], fo
             alpha, known = tasks[i].optimum(other), tasks[i].optimum(found[i])
             if alpha is not None and (known is None or alpha < known - MULTISTART.clearly):
                 found[i], replaced = other, True
+                solver.solves.counts.keep(1)
     return replaced
 
 

@@ -76,6 +76,7 @@ def polished(
         if not len(begun):
             return front.replace(stats=more_costs(front.stats, evaluator.counts, interrupts.elapsed, interrupts.reason))
         archive = polish(begun, left, limit, guide=guide)
+        evaluator.counts.kept_for += left.results.kept_for
         untouched = {z.tobytes() for z in begun.Z} if len(known) else set()
         Z = archive.Z[[z.tobytes() not in untouched for z in archive.Z]]
         moved, unseen = np.zeros(len(Z), dtype=bool), 0

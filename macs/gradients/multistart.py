@@ -27,6 +27,7 @@ from transcription.smooth import Smooth
 from transcription.stopping import Stopped, stopping
 
 from ..evaluation.evaluator import CONVERGED
+from ..io.interrupts import spending
 from ..io.workers import TOGETHER
 from ..pareto.archive import Archive
 from .scalarised import WORK, GradientSolves, Scalarised
@@ -226,6 +227,7 @@ class MultistartSolver:
         """Which objectives (m,) have one optimum for each time, and do not get worse with time: no start finds a better one."""
         return convex_objectives(self.nlp) & ~np.isin(np.arange(len(self.nlp.problem.goals)), self._uneven)
 
+    @spending("starts")
     def _over_times(self) -> None:
         """Once, where there is a free time: add to what is known the optima for given times, from the longest on, each from the one before,
         of the objectives that are convex then, and not of that time alone."""
@@ -266,8 +268,20 @@ class MultistartSolver:
         begun = [(first, task) for first, task in zip(firsts, tasks, strict=True) if first is not None]
         others = [task for first, task in zip(firsts, tasks, strict=True) for _ in range((self.starts or 1) - (first is not None))]
         found = [*zip((task for _, task in begun), self.from_vectors(begun), strict=True)]
-        found += [*zip(others, self.from_draws(others), strict=True)]
-        return [min((solved for other, solved in found if other is task), key=task.rank) for task in tasks]
+        drawn = self.from_draws(others)
+        found += [*zip(others, drawn, strict=True)]
+        best = [min((solved for other, solved in found if other is task), key=task.rank) for task in tasks]
+        good = [any(one is other for other in drawn) for one in best if one.status == CONVERGED]
+        self.solves.counts.keep(good.count(False))
+        with spending("starts"):
+            self.solves.counts.keep(good.count(True))
+        return best
+
+    def better(self, known: Solved, new: Solved, task: Scalarised) -> Solved:
+        """The better of two results, the new one of which is then counted as kept."""
+        best = min(known, new, key=task.rank)
+        self.solves.counts.keep(best is new and new.status == CONVERGED)
+        return best
 
     def single(self, i: int) -> Solved:
         """The optimum of objective i alone. A solve from the best known vector may fail if that is an optimum of another objective within
@@ -284,7 +298,7 @@ class MultistartSolver:
         (solved,) = self.from_rivals([solved], [task])
         for start in self._known.Z[: self._given] if solved.status != CONVERGED and not self.closest else ():
             if begun is None or (start != begun).any():
-                solved = min(solved, self.from_vector(start, task), key=task.rank)
+                solved = self.better(solved, self.from_vector(start, task), task)
         return solved
 
     def seek(self, task: Scalarised, stopping_rule: MultistartStopping) -> Solved:
@@ -294,6 +308,7 @@ class MultistartSolver:
         stopping_rule.add(task.optimum(first))
         return self.drawn(first, task, stopping_rule, max(WORK.little, self.solves.counts.work - before))[0]
 
+    @spending("starts")
     def first(self, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
         """The result of the first of several starts, from something feasible if it leads to nothing feasible; one that is drawn is given up
         soon: on a coarse mesh nothing may be feasible. See `with_feasible_start`."""
@@ -302,10 +317,12 @@ class MultistartSolver:
             return self.with_feasible_start(self.closest or self.solve(task), task, tries)
         with self.solves.at_most(MULTISTART.iterations):
             solved = self.from_vector(self._starts.draw()[0], task)
+        self.solves.counts.keep(solved.status == CONVERGED)
         if solved.status != CONVERGED and solved.violation <= self.solves.tolerance:
             return self.from_vector(solved.z, task)
         return self.with_feasible_start(solved, task, tries)
 
+    @spending("starts")
     def drawn(self, best: Solved, task: Scalarised, stopping_rule: MultistartStopping, work: float) -> tuple[Solved, list[Solved]]:
         """The best result, one of which is known, and those of drawn starts, until there are enough or so much work is done; twice as much
         where the best of several optima was found only once."""
@@ -332,12 +349,15 @@ class MultistartSolver:
                 found += new
                 # One that is hardly better is the same optimum: that of the first start is as good.
                 for one in new:
-                    if stopping_rule.add(task.optimum(one)) or (not stopping_rule.converged and one.violation < best.violation):
+                    better = stopping_rule.add(task.optimum(one))
+                    self.solves.counts.keep(better)
+                    if better or (not stopping_rule.converged and one.violation < best.violation):
                         best = one
         if stopping_rule.convex and (rival := self.rival(best, task)) is not None:
-            best = min(best, self.from_vector(rival, task, near=True), key=task.rank)
+            best = self.better(best, self.from_vector(rival, task, near=True), task)
         return best, found
 
+    @spending("starts")
     def with_feasible_start(self, solved: Solved, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
         """The result of a solve or, if infeasible, of one from a feasible vector near the best known or drawn ones, whose fewest and most
         numbers are `tries`; without any, what violates least, now and later: `closest`."""
@@ -350,7 +370,7 @@ class MultistartSolver:
         while not stopping() and len(tried) < most and (len(tried) < fewest or self.solves.counts.work < limit):
             near = self.solves.least_violation(self.nlp, next(starts))
             if near.status == CONVERGED:
-                return min(solved, self.from_vector(near.z, task), key=task.rank)
+                return self.better(solved, self.from_vector(near.z, task), task)
             tried.append(near)
         if sum(near.status == INFEASIBLE for near in tried) >= fewest:
             self.closest = min(tried, key=lambda near: near.violation)
@@ -372,6 +392,7 @@ class MultistartSolver:
         """The same for several vectors, each with its problem, side by side."""
         return [self._added(solved) for solved in self.solves.each(self.nlp, begun, near)]
 
+    @spending("starts")
     def from_draws(self, tasks: Sequence[Scalarised], known: Sequence[Solved] = ()) -> list[Solved]:
         """The result of a solve of each problem from a random start, near a known optimum where there is one; without, from the states of
         the guess if propagated ones lead to no optimum."""
@@ -433,7 +454,7 @@ class MultistartSolver:
             rivals = {k: rival for k, task in enumerate(tasks) if (rival := self.rival(found[k], task)) is not None}
             again = self.from_vectors([(rival, tasks[k]) for k, rival in rivals.items()], near)
             for k, solved in zip(rivals, again, strict=True):
-                found[k] = min(found[k], solved, key=tasks[k].rank)
+                found[k] = self.better(found[k], solved, tasks[k])
         return found
 
     def is_least(self, solved: Solved, task: Scalarised) -> bool:

@@ -10,7 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..evaluation.evaluator import CONVERGED, FAILED, Evaluation, Evaluator
+from ..evaluation.evaluator import CONVERGED, FAILED, Counts, Evaluation, Evaluator
+from ..io.interrupts import spending
 from ..io.workers import TOGETHER
 from ..pareto.archive import Archive
 from ..pareto.directions import across, divisions_below, simplex_lattice
@@ -38,6 +39,7 @@ class PolishLimits:
 POLISH = PolishLimits()
 
 
+@spending("polish")
 def polish(
     archive: Archive,
     solves: BudgetedSolves,
@@ -83,25 +85,36 @@ def polish(
     pool, span = archive, ranges(archive.F)
     archive = _thinned(pool, limit, exponent, guide)
     for _ in range(POLISH.rounds):
-        references, starts, gaps = _slide(archive, limit, exponent, guide)
-        if not (len(references) and solves.left):
-            break
-        found = solves(starts, references, np.tile(span, (len(references), 1)))
-        pool = pool.joined(Archive.of(found, solves.feasible(found)))
-        failed = gaps[np.flatnonzero(found.status[: len(gaps)] != CONVERGED)]
-        if len(failed) and solves.left:
-            near, far = failed.ravel(), failed[:, ::-1].ravel()
-            nearer = archive.F[near] + POLISH.nearer * (archive.F[far] - archive.F[near])
-            found = solves(archive.Z[near], nearer, np.tile(span, (len(near), 1)))
-            pool = pool.joined(Archive.of(found, solves.feasible(found)))
-        pool = _front(pool, span)
-        before, archive = archive, _thinned(pool, limit, exponent, guide)
-        if np.array_equal(before.F, archive.F):
+        before, known, pool = archive, pool, _slid(archive, pool, solves, span, limit, exponent, guide)
+        archive = _thinned(pool, limit, exponent, guide)
+        if pool is known or np.array_equal(before.F, archive.F):
             break
     archive = archive if alike else _helped_by_neighbours(archive, solves, extremes(archive.F))
     if len(waiting):
         archive = _thinned(_front(archive.joined(waiting), span), limit, exponent, guide)
     return archive
+
+
+@spending("gaps")
+def _slid(
+    archive: Archive, pool: Archive, solves: BudgetedSolves, span: np.ndarray, limit: int, exponent: float | None, guide: Guide | None
+) -> Archive:
+    """The pool with the results of solves by which points of an archive slide along the front, and of those in its gaps; the pool itself
+    without any."""
+    references, starts, gaps = _slide(archive, limit, exponent, guide)
+    if not (len(references) and solves.left):
+        return pool
+    found = solves(starts, references, np.tile(span, (len(references), 1)))
+    new = Archive.of(found, solves.feasible(found))
+    failed = gaps[np.flatnonzero(found.status[: len(gaps)] != CONVERGED)]
+    if len(failed) and solves.left:
+        near, far = failed.ravel(), failed[:, ::-1].ravel()
+        nearer = archive.F[near] + POLISH.nearer * (archive.F[far] - archive.F[near])
+        found = solves(archive.Z[near], nearer, np.tile(span, (len(near), 1)))
+        new = new.joined(Archive.of(found, solves.feasible(found)))
+    both = _front(pool.joined(new), span)
+    solves.results.keep(among(new.F, both.F) & ~among(new.F, pool.F))
+    return both
 
 
 def _thinned(pool: Archive, limit: int, exponent: float | None, guide: Guide | None) -> Archive:
@@ -124,6 +137,7 @@ def _descend(
     points = archive.take(chosen)
     found = solves(points.Z, points.F, np.tile(span, (len(points), 1)))
     kept = feasible_and_no_worse(found, points.F, points.violation, span)
+    solves.results.keep(kept)
     archive = points.replaced(kept, found).joined(archive.take(~chosen))
     return _front(_ends(archive, span, solves, solved).joined(archive), span), waiting
 
@@ -152,13 +166,17 @@ def _ends(archive: Archive, span: np.ndarray, solves: BudgetedSolves, solved: np
     fair = (gain > POLISH.fair) | ((single.F - best.F) / span <= POLISH.loss).all(axis=1)
     kept = (single.status == CONVERGED) & (gain >= -slack(best.violation)) & fair
     ends = best.replaced(kept, single)
+    solves.results.keep(kept)
     if m == 1:
         return ends
     # The least value of its own objective becomes a limit, and all others are lowered together.
     both = solves(ends.Z, ends.F, np.where(one, 0.0, span))
-    return ends.replaced(feasible_and_no_worse(both, ends.F, ends.violation, span), both)
+    kept = feasible_and_no_worse(both, ends.F, ends.violation, span)
+    solves.results.keep(kept)
+    return ends.replaced(kept, both)
 
 
+@spending("neighbours")
 def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.ndarray | None = None) -> Archive:
     """The archive after guarded solves of all, or the chosen, points from their neighbours, the most promising first, until as many in
     a row as there are points find nothing better; not those that failed before. The archive itself if none improves."""
@@ -176,6 +194,7 @@ def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.n
         i, j = np.array([pairs[k] for k in some]).T
         found = solves(archive.Z[j], archive.F[i], np.tile(span, (len(some), 1)))
         gained = (found.status == CONVERGED) & (((archive.F[i] - found.F) / span).min(axis=1) > BETTER)
+        solves.results.keep(gained)
         fruitless = int(np.argmax(gained[::-1])) if gained.any() else fruitless + count
         if gained.any():
             solves.promise(m)
@@ -268,6 +287,7 @@ class Surface:
         """Add the result of a solve to a place."""
         found = solves(self.pool.Z[[start]], (self.ideal + self.between * place)[None], self.between[None])
         feasible = solves.feasible(found)
+        solves.results.keep(feasible)
         self.known = np.vstack([self.known, place, self.plane(found.F[feasible])])
         self.pool = Archive.of(found, feasible).joined(self.pool)
         # What ran out of iterations is to go on.
@@ -337,7 +357,7 @@ class PolishLog:
 class BudgetedSolves:
     """Gradient solves up to a number and, but for those that are promised, up to the most work of the whole search; after a request to end
     early no more are made. `failed_pairs` (k, 2 m) has the objectives of points and of the neighbours from which nothing better was
-    found for them."""
+    found for them, and `results` how many were kept: of a polish that is continued, those before, too."""
 
     def __init__(
         self,
@@ -349,7 +369,7 @@ class BudgetedSolves:
     ) -> None:
         self._evaluator, self._log, self._most_work = evaluator, log, most_work
         self._made, self._promised, self._answers = 0, 0, dict[bytes, Evaluation]()
-        self.left, self.stopped, self.failed_pairs = left, False, failed_pairs
+        self.left, self.stopped, self.failed_pairs, self.results = left, False, failed_pairs, Counts()
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
         """The results of `Evaluator.descend`; rows beyond the number of solves count as failed."""

@@ -16,10 +16,11 @@ from threadpoolctl import threadpool_limits
 
 from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_by
 
-__all__ = ["Interrupts", "Stopped", "spending", "work_on_trajectories"]
+__all__ = ["Interrupts", "Stopped", "purpose", "spending", "work_on_trajectories"]
 
 _AT_ONCE: ContextVar[bool] = ContextVar("interrupted at once", default=False)
 _SPENT: ContextVar[dict[str, float] | None] = ContextVar("spent", default=None)
+_PURPOSE: ContextVar[str] = ContextVar("purpose", default="other")
 
 TIME_LIMIT = "time limit"
 """Reason to end work that has taken as long as it may."""
@@ -104,15 +105,23 @@ def at_once() -> Iterator[None]:
 
 @contextmanager
 def spending(what: str) -> Iterator[dict[str, float]]:
-    """A context, or decorator, whose seconds, without those of others within, are spent on this; with all that is within the outermost."""
+    """A context, or decorator, whose seconds and gradient solves (`Counts`), without those of others within, are spent on this; with the
+    seconds of all that is within the outermost."""
     known = _SPENT.get()
     spent = {} if known is None else known
     token, before, began = _SPENT.set(spent), sum(spent.values()), time.perf_counter()
+    inner = _PURPOSE.set(what)
     try:
         yield spent
     finally:
         spent[what] = spent.get(what, 0.0) + time.perf_counter() - began - (sum(spent.values()) - before)
         _SPENT.reset(token)
+        _PURPOSE.reset(inner)
+
+
+def purpose() -> str:
+    """What work is spent on here."""
+    return _PURPOSE.get()
 
 
 @contextmanager

@@ -30,6 +30,7 @@ from ..fronts.verified import fixed_scales
 from ..gradients.ends import moved_along
 from ..gradients.scalarised import MOST_ITERATIONS, GradientSolves, LexicographicEnd, Scalarised
 from ..io.console import working
+from ..io.interrupts import spending
 from ..io.text import counted
 from ..io.workers import TOGETHER
 from ..pareto.dominance import extremes
@@ -57,6 +58,7 @@ NOT_BEGUN = "it was not solved on a finer mesh"
 """Note of a point that was still to be refined when the work was to end."""
 
 
+@spending("meshes")
 def refine_mesh(front: Points, tolerance: float, limit: int, time_limit: float | None, progress: bool | None, more: bool = True) -> Points:
     """The points on refined meshes; see `Front.refine_mesh`."""
     check_positive("tolerance", tolerance)

@@ -84,6 +84,7 @@ def mended(
         return job.with_costs(job.with_reasons(kept.sorted()), interrupts.elapsed, interrupts.reason)
 
 
+@spending("mending")
 def resolve_unverified(points: Points, verify: float) -> Points:
     """The points in their order, the unverified ones re-solved. They are simulated first if none was."""
     with working(None, None) as (show, interrupts):
@@ -218,6 +219,7 @@ class _Mending:
                 points = _separate(joined[best_rows(joined)])
                 new = "no better than another point" if points.verified.sum() <= before else ""
                 fruitless = fruitless if new else 0
+                self._solves.counts.keep(not new)
             without[new] += 1
         points, why = points[_within(points, size, guide)], ", ".join(f"{count} {why}" for why, count in without.items() if why)
         if len(points) < size and (why or ended):
@@ -257,6 +259,7 @@ class _Mending:
                 certificate = certified(nlp, found.z[None], scales)
                 new = self.marked(from_vectors(nlp, found.z[None], points.solver, points.stats, **certificate, **_judged(points[[i]])))
                 better |= {i: new} if new.verified[0] else {}
+        self._solves.counts.keep(len(better))
         if not better:
             return points
         return Points.concatenate([better.get(i, points[[i]]) for i in range(len(points))]).replace(
@@ -341,8 +344,10 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: flo
         scales = objective_scales(points)
         Z, feasible, changed = back_off(evaluator, np.array([points[i].decision for i in own]), scales, verify)
         worse = ((nlp.evaluate(Z)[0] - points.F[own]) / scales).max(axis=1)
+        good = np.flatnonzero(feasible & changed & (worse <= loss)).tolist()
+        evaluator.counts.keep(len(good))
         points = points.replace(stats=more_costs(points.stats, evaluator.counts, 0.0, ""))
-        for k in np.flatnonzero(feasible & changed & (worse <= loss)).tolist():
+        for k in good:
             moved[own[k]] = from_vectors(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE], **_judged(points[[own[k]]]))
     if not moved:
         return points

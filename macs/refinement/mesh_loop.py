@@ -28,6 +28,7 @@ from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED, Counts
 from ..gradients.scalarised import WORK, GradientSolves, LexicographicEnd, Scalarised, Start, best_of
+from ..io.interrupts import purpose, spending
 from ..io.workers import each
 from ..pareto.dominance import objective_units, stated_scales
 
@@ -211,7 +212,7 @@ class MeshLoop:
         """`do(loop, *piece)` of independent pieces side by side (`io.workers`), each with a loop of its own that may do an equal part
         of the work that is left, and at `most` so much; None of one that ended before it gave anything."""
         solves, work = self.solves, min(most, self.left / max(len(pieces), 1))
-        limits = solves.tolerance, solves.max_iterations, self.wanted, self.limit, work, self.enough, self.more
+        limits = purpose(), solves.tolerance, solves.max_iterations, self.wanted, self.limit, work, self.enough, self.more
         found = each(_alone, self.programs, [(self.programs.sizes, *limits, do, *piece) for piece in pieces])
         for _, counts, sizes in found:
             solves.counts, self.programs.sizes = solves.counts.joined(counts), self.programs.sizes | sizes
@@ -273,6 +274,7 @@ class MeshLoop:
                 if not stopping():
                     found.trouble = TROUBLES.get(status, f"on the next finer mesh its status is '{status}'")
                 break
+            self.solves.counts.keep(1)
             least = min(least, _achieved(reached, task))
             present, task = reached, replace(task, known=reached.F) if isinstance(task, LexicographicEnd) else task
             seen.append(present)
@@ -380,6 +382,7 @@ class MeshLoop:
 def _alone(
     programs: Programs,
     sizes: Mapping[Transcription, int],
+    what: str,
     tolerance: float,
     iterations: int,
     wanted: Wanted,
@@ -392,7 +395,7 @@ def _alone(
 ) -> tuple[Result | None, Counts, dict[Transcription, int]]:
     """One piece of `MeshLoop.each`, its costs, and the sizes of all programs by then."""
     loop, found = MeshLoop(programs.apart(sizes), GradientSolves(tolerance, iterations), wanted, limit, work, enough, more), None
-    with suppress(Stopped):
+    with suppress(Stopped), spending(what):
         found = do(loop, *piece)
     return found, loop.solves.counts, loop.programs.sizes
 

@@ -32,6 +32,7 @@ from ..fronts.verified import verified
 from ..gradients.ends import lexicographic_ends
 from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Rules, guessed_start, is_least
 from ..gradients.scalarised import WORK, GradientSolves, LexicographicEnd, Scalarised
+from ..io.interrupts import spending
 from .mesh_loop import MeshLoop, Programs, Refinement, differentiable
 
 COARSE: tuple[Meshed, ...] = (
@@ -273,6 +274,7 @@ class MeshSearch:
         self._others: list[tuple[Callable[[np.ndarray], Trajectory], list[Solved]]] = []  # what other starts on coarse meshes led to
         self.exhausted, self._hopeless, self._begun = False, 0, False
 
+    @spending("meshes")
     def go(self, coarse: Sequence[Meshed]) -> None:
         """Solve on coarse meshes and refine the results, until all are good or another mesh does not pay; then solve from other starts."""
         left = list(coarse)

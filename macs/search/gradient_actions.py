@@ -24,9 +24,10 @@ from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_bet
 from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Rules, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
+from ..io.interrupts import spending
 from ..io.workers import TOGETHER
 from ..pareto.archive import Archive
-from ..pareto.dominance import CURVE, extremes, feasible_and_no_worse, nearest, ranges
+from ..pareto.dominance import CURVE, among, extremes, feasible_and_no_worse, nearest, ranges
 from ..pareto.spread import Guide
 from . import social
 from .settings import Settings
@@ -112,6 +113,7 @@ class Opening:
         solver.stopping.update({} if count else self._rules)
         return solver
 
+    @spending("starts")
     def _decided(self, solver: MultistartSolver | None) -> bool:
         """Whether a gradient solve for the first objective ends at an optimum, or solves for feasibility find that there is none."""
         if solver is None:
@@ -139,11 +141,13 @@ class Opening:
                 if self._evaluator.ways:
                     found += solve_tasks(solver, tasks_between(F, ranges(F), max(self._points, len(F) + 1), METHODS[0]))
                 else:
-                    found.append(solver.solve(Scalarised(F.min(axis=0), ranges(F))))
+                    with spending("points between"):
+                        found.append(solver.solve(Scalarised(F.min(axis=0), ranges(F))))
         assert isinstance(self._evaluator, Bilevel)
         return _feasible_of(found, self._evaluator)
 
     @staticmethod
+    @spending("ends")
     def _single(solver: MultistartSolver, i: int) -> Solved:
         """The optimum of objective i, from other starts, too, if that known on another mesh leads to none."""
         solved = solver.single(i)
@@ -204,6 +208,7 @@ def restart_solves(
     return _feasible_of(found, evaluator), np.array(starts).reshape(-1, 2)
 
 
+@spending("starts")
 def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) -> None:
     """Make the gradient solves from other starts at the beginning of a round, where the search chooses its inner solver."""
     rounds = state.rounds if evaluator.has_gradients else None
@@ -216,8 +221,10 @@ def begin_round(state: SearchState, settings: Settings, evaluator: Evaluator) ->
         memory.starts, rounds.restarts = np.vstack([memory.starts, starts]), rounds.due
         state.add_optima(Archive.of(solved, solved.status == CONVERGED))
         update_archives(state, [solved], settings, evaluator)
+        evaluator.counts.keep(among(solved.F, state.archive.F))
 
 
+@spending("agents")
 def gradient_actions(state: SearchState, settings: Settings, evaluator: Evaluator, guide: Guide | None) -> None:
     """Make the gradient solves of agents that are due, if the problem has derivatives."""
     if not (settings.refines and evaluator.has_gradients):
@@ -233,6 +240,7 @@ def gradient_actions(state: SearchState, settings: Settings, evaluator: Evaluato
         limit = agents.F[i] if agents.violation[i] <= evaluator.tolerance else np.full(agents.F.shape[1], np.inf)
         if feasible_and_no_worse(one, limit[None], agents.violation[i : i + 1], span)[0]:
             agents.place(np.array([i]), one.Z, one.F, one.violation)
+            evaluator.counts.keep(1)
     give_credit(state, -1, gains.of(found), evaluator.counts.work - before, len(found.F))
     update_archives(state, [found], settings, evaluator)
 
@@ -257,6 +265,7 @@ def polish_archive(state: SearchState, settings: Settings, evaluator: Evaluator,
     same = memory.polished is None and alike(memory.starts, state.archive.F)
     exponent = settings.variant.energy_exponent
     state.archive = polish(log.archive, solves, settings.archive, exponent, guide, state.optima, same)
+    evaluator.counts.kept_for += solves.results.kept_for
     if solves.stopped:
         return None
     memory.polishing, memory.polished, memory.failed_pairs = None, state.archive, solves.failed_pairs

@@ -1,6 +1,6 @@
 """Checkpoints: a run is saved in a file, so that the same call continues it after any end.
 
-The first line of a file is `MACS checkpoint 7: N bytes, sha256 H`; N and H are those of the MessagePack document that follows. So a damaged
+The first line of a file is `MACS checkpoint 8: N bytes, sha256 H`; N and H are those of the MessagePack document that follows. So a damaged
 file is refused before any of it is read. In a forged file, no array takes more memory than the file has bytes. Nothing is pickled. The
 document has the identity of the run, the versions that computed it, and its state; see `packing`.
 """
@@ -31,7 +31,7 @@ from ..io.text import document
 from .method import SearchMethod
 from .packing import check_kept, check_shapes, decode, encode
 
-CHECKPOINT_VERSION = 7
+CHECKPOINT_VERSION = 8
 """Of the file format: of the document, and of the states in it."""
 FIRST_LINE = re.compile(rb"MACS checkpoint (\d{1,9}): (\d{1,18}) bytes, sha256 ([0-9a-f]{64})\n")
 LARGEST_CHECKPOINT = 2**32
@@ -194,9 +194,10 @@ def keeps(solver: SearchMethod) -> bool:
 
 def _check_counts(status: RunStatus) -> None:
     """Raise ValueError for a number that no run can have."""
-    numbers = {f"counts.{name}": count for name, count in vars(status.counts).items() if name not in ("failures", "first_failure")}
-    failures = {f"counts.failures[{name!r}]": count for name, count in status.counts.failures.items()}
-    for name, number in {"seed": status.seed, "idle": status.idle, "elapsed": status.elapsed, **numbers, **failures}.items():
+    counts = {f"counts.{name}": count for name, count in vars(status.counts).items() if name != "first_failure"}
+    by = {f"{name}[{what!r}]": one for name, count in counts.items() if isinstance(count, dict) for what, one in count.items()}
+    numbers = {name: count for name, count in counts.items() if not isinstance(count, dict)}
+    for name, number in {"seed": status.seed, "idle": status.idle, "elapsed": status.elapsed, **numbers, **by}.items():
         if isinstance(number, bool) or not isinstance(number, int | float) or not 0 <= number < math.inf:
             raise ValueError(f"{name} is {number!r}, a number of at least 0 expected")
 

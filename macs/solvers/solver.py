@@ -136,7 +136,9 @@ class Solver(SearchMethod):
 
         Notes
         -----
-        After more than ten seconds, `stats["seconds"]` has what they were spent on: search, certificates, mending, simulation, explanation.
+        After more than ten seconds, `stats["seconds"]` has what they were spent on: certificates, simulation, explanation, what gradient
+        solves were for ("starts", "ends", ...), and "search" for all else. `stats["solves_for"]` has the numbers of these solves,
+        "iterations_for" their iterations, and "kept_for" how many gave a new point or a better one.
 
         Without a number of evaluations, MACS searches in rounds, each with a polish if there are gradients and something new was found. It
         ends when further work did not improve the front: 150 evaluations (2000 without gradients). Where a later round improved the front,

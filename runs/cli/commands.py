@@ -17,6 +17,7 @@ import transcription
 from macs.front import Front
 from macs.fronts.pictures.front_plot import save_front, save_picture
 from macs.fronts.point import Point
+from macs.fronts.tables import solves_table
 from macs.fronts.verification import Check
 from macs.fronts.verification import verify as verify_front
 from macs.io.atomic import check_target
@@ -125,7 +126,7 @@ def show(arguments: Namespace) -> int:
     point = None if arguments.point is None else find_point(front, arguments.point)
     if arguments.plot and point is not None and front.dynamic and point.trajectory is None:
         raise WrongCall(f"point {arguments.point} has no trajectory to draw")
-    print(front.table() if point is None else describe(front, point))
+    print("\n\n".join(filter(None, (front.table(), solves_table(front)))) if point is None else describe(front, point))
     if arguments.plot:
         draw(front if point is None else point, arguments.plot, costates=arguments.costates)
     if arguments.csv:

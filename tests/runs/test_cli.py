@@ -348,10 +348,16 @@ def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, refused, monkeypatc
 
 
 def test_show_prints_draws_and_exports(capsys):
-    flights(3).save("front.nc")
+    front = flights(3)
+    front.replace(stats=front.stats | {"solves_for": {"ends": 3}, "iterations_for": {"ends": 41}, "kept_for": {"ends": 1}}).save("front.nc")
     assert main(["show", "front.nc", "--plot", "a.pdf", "--csv", "a.csv"]) == 0
     out = capsys.readouterr().out
-    assert "height" in out and "picture in a.pdf" in out and "values in a.csv" in out
+    assert (
+        "ends                      3          41     1" in out
+        and "height" in out
+        and "picture in a.pdf" in out
+        and "values in a.csv" in out
+    )
     assert Path("a.pdf").read_bytes().startswith(b"%PDF") and Path("a.csv").read_text().startswith("point,time [s],height [km]")
 
 

@@ -4,11 +4,13 @@ iterations of IPOPT times variables of its program."""
 import numpy as np
 import pytest
 
-from macs import MACS
+from macs import MACS, Front, sweep
 from macs.evaluation import bilevel
 from macs.evaluation.bilevel import Bilevel
-from macs.evaluation.evaluator import Evaluation
+from macs.evaluation.evaluator import Counts, Evaluation
 from macs.fronts.provenance import merged_stats, more_costs
+from macs.fronts.tables import solves_table
+from macs.io.interrupts import spending
 from problems import Problem, load
 from transcription import DFET, InnerResult, InnerSolver
 from transcription.inner import Ipopt, Newton, Propagate, inner_solver
@@ -67,6 +69,32 @@ def test_gradient_solves_may_take_longer_where_all_are_long(monkeypatch):
     for _ in outcomes:
         evaluator.descend(np.zeros((1, n)), np.zeros((1, 2)), np.ones((1, 2)))
     assert allowed == [100, 270, 270, 210, 500]
+
+
+def test_what_gradient_solves_were_for_is_counted_added_up_and_read_again(tmp_path):
+    first, second = Counts(), Counts()
+    with spending("starts"):
+        first.add_solves(2, ["converged", "failed"], 30, 0, 5)
+        with spending("ends"):
+            first.add_solves(1, ["converged"], 8, 0, 5)
+            second.add_solves(1, ["converged"], 9, 0, 5)
+        first.keep([True, False])
+    second.add_solves(1, ["failed"], 7, 0, 5)
+    both = first.joined(second)
+    assert both.solves_for == {"starts": 2, "ends": 2, "other": 1} and both.iterations_for == {"starts": 30, "ends": 17, "other": 7}
+    assert both.kept_for == {"starts": 1}
+    front = sweep(load("goddard"), METHOD, points=4, starts=2, verify=None)
+    merged = Front.merge([front, front])
+    merged.save(tmp_path / "front.nc")
+    stats, again = front.stats, Front.load(tmp_path / "front.nc").stats
+    assert set(stats["solves_for"]) == set(stats["iterations_for"]) == {"starts", "ends", "points between"}
+    assert sum(stats["solves_for"].values()) == stats["gradient_solves"]
+    assert sum(stats["iterations_for"].values()) == stats["inner_iterations"]
+    assert all(kept <= stats["solves_for"][what] for what, kept in stats["kept_for"].items())
+    assert stats["kept_for"]["points between"] == 2 and stats["kept_for"]["starts"] >= 2, "two points, and an optimum of each objective"
+    assert again["solves_for"] == {what: 2 * number for what, number in stats["solves_for"].items()}
+    number = str(again["solves_for"]["ends"])
+    assert [row.split()[1] for row in solves_table(merged).splitlines() if row.startswith("ends")] == [number]
 
 
 @pytest.mark.slow

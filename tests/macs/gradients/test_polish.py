@@ -347,6 +347,7 @@ class Spheres:
 
     left: int
     begun: list[float] = field(default_factory=list)
+    results: Counts = field(default_factory=Counts)
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
         (radius,), reference, weight = starts[0], references[0], weights[0]
