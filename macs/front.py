@@ -299,15 +299,20 @@ class Front(Points):
         curve = curve_of(self)
         return self[int(nearest(curve.knee * self.signs, np.where(np.isfinite(self.F), self.F, np.inf), curve.ranges)[0])]
 
-    def table(self, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
+    def table(self, columns: Mapping[str, Sequence[Any]] | None = None, *, details: bool = False) -> str:
         """The front as plain text: a headline, a row for each point, those that are not verified apart, and warnings.
+
+        Objectives have the digits within which points were judged to be verified (`Point.tolerances`), and at least four of their range.
 
         Parameters
         ----------
         columns : mapping, optional
             Further columns: header -> n values.
+        details : bool
+            With violation, defect, differences of a simulation, optimality and numbers of elements. They are there in any case where a
+            point did not converge or is not verified.
         """
-        return front_table(self, columns)
+        return front_table(self, columns, details)
 
     def plot(self, ax: Axes | None = None, *, marked: Sequence[int] = (), beside: Mapping[str, Any] | None = None) -> Axes:
         """Axes with the objectives: two as points on their `curve`, three with the third as colour, more as parallel coordinates.

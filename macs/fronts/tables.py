@@ -21,8 +21,11 @@ from .points import Points
 from .provenance import COUNTED_BY
 from .verified import AGAIN, MISSES, constant_objectives, missed, untrusted
 
+MOST_PARAMETERS = 6
+"""Number of parameters up to which a table has them."""
 
-def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = None) -> str:
+
+def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = None, details: bool = False) -> str:
     """Text with a headline, a row for each point and a footer; see `Front.table`.
 
     Points that were simulated and are not verified stand apart, below the others.
@@ -32,7 +35,7 @@ def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = Non
             raise ValueError(f"column '{header}' has {len(values)} entries, the front has {len(front)} points")
     if not len(front):
         return "\n".join([headline(front), "", *_nothing(front)])
-    table = _table(front, columns or {})
+    table = _table(front, columns or {}, details)
     lines = text_table(table.headers, table.rows, table.left).split("\n")
     if table.apart:
         lines.insert(len(lines) - table.apart, f"\n{_said_apart(front)}")
@@ -44,7 +47,7 @@ def front_html(front: Points, picture: bytes, most: int = 30) -> str:
     what = f"front: {headline(front)}"
     if not len(front):
         return html_block(headline(front), "", _nothing(front)[:1], picture, what)
-    table = _table(front, {})
+    table = _table(front, {}, details=False)
     dim = range(len(front) - table.apart, len(front))
     shown = html_table(table.headers, table.rows[:most], table.left, dim)
     notes = [f"{counted(len(front) - most, 'more point')}: front.table()"] if len(front) > most else []
@@ -67,37 +70,61 @@ def _said_apart(front: Points) -> str:
     return f"Not verified: {again}these differ by more than {front.stats['verify']:g}."
 
 
-def _table(front: Points, columns: Mapping[str, Sequence[Any]]) -> _Table:
-    """The cells, a row for each point, with further columns."""
-    vector, was = _is_vector(front), front.was_simulated
+def _table(front: Points, columns: Mapping[str, Sequence[Any]], details: bool) -> _Table:
+    """The cells, a row for each point, with further columns; residuals and the like as `details`, or where a point is not good."""
+    was = front.was_simulated
+    outside = front.dynamic and any(point.excursions for point in front if point.verified is None)
+    details = details or outside or bool((front.status != CONVERGED).any() or (was & ~front.verified).any())
     # Title and unit, cells, and whether they are flush left.
     table: list[tuple[tuple[str, str], Sequence[str], bool]] = [(("#", ""), [str(i) for i in range(len(front))], False)]
-    for goal, values in zip(front.goals, front.objectives.T, strict=True):
-        table.append(((goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]"), numbers(values), False))
-    table.append((("violation", ""), _small(front.violation), False))
-    if vector and len(front.variables) <= 6:
-        for variable, values in zip(front.variables, front.decision.T, strict=True):
-            meant = [str(variable.meant(value)) for value in values] if variable.integer else numbers(values)
-            table.append(((variable.name, f"[{variable.unit or '-'}]"), meant, bool(variable.choices)))
-    if was.any():
+    for goal, values, tolerance in zip(front.goals, front.objectives.T, known_within(front), strict=True):
+        table.append(((goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]"), numbers(values, tolerance), False))
+    for name, unit, values in parameters_of(front):
+        words = not all(isinstance(value, float) for value in values)
+        cells = ["-" if value is None else str(value) for value in values] if words else numbers(values)
+        table.append(((name, f"[{unit or '-'}]"), cells, any(isinstance(value, str) for value in values)))
+    table += _residuals(front) if details else []
+    for header, given in columns.items():
+        table.append(((header, ""), [value if isinstance(value, str) else f"{value:.1e}" for value in given], False))
+    table.append((("status", ""), [_status(point) for point in front], True))
+    if details and len({id(one) for one in front.transcriptions}) > 1:
+        table.append((("elements", ""), [_elements(point) for point in front], False))
+    if details and front.dynamic and not was.all():
+        table.append((("between nodes", "leaves bounds"), [_excursion(point.excursions) for point in front], True))
+    apart = np.flatnonzero(was & ~front.verified)
+    order = [*np.setdiff1d(np.arange(len(front)), apart), *apart]
+    heads, cells_of, left = zip(*table, strict=True)
+    rows = list(zip(*cells_of, strict=True))
+    return _Table([*zip(*heads, strict=True)], [rows[i] for i in order], left, len(apart))
+
+
+def _residuals(front: Points) -> list[tuple[tuple[str, str], Sequence[str], bool]]:
+    """Columns of a table: by how much points violate constraints, differ from their simulation, and miss the conditions of an optimum."""
+    table = [(("violation", ""), _small(front.violation), False)]
+    vector = _is_vector(front)
+    if front.was_simulated.any():
         off, how = missed(front) * front.within[:, None], "again" if vector else "simulated"
         table += [] if vector else [(("defect", how), _small(front.defect), False)]
         table.append((("violation", how), _small(front.simulated_violation), False))
         table.append((("objectives", "off by"), _small(off.max(axis=1)), False))
-    for header, given in columns.items():
-        table.append(((header, ""), [value if isinstance(value, str) else f"{value:.1e}" for value in given], False))
     if any(value is not None for value in front.optimality):
         table.append((("optimality", ""), _small(front.optimality), False))
-    table.append((("status", ""), [_status(point) for point in front], True))
-    if len({id(one) for one in front.transcriptions}) > 1:
-        table.append((("elements", ""), [_elements(point) for point in front], False))
-    if front.dynamic and not was.all():
-        table.append((("between nodes", "leaves bounds"), [_excursion(point.excursions) for point in front], True))
-    apart = np.flatnonzero(was & ~front.verified)
-    order = [*np.setdiff1d(np.arange(len(front)), apart), *apart]
-    heads, cells, left = zip(*table, strict=True)
-    rows = list(zip(*cells, strict=True))
-    return _Table([*zip(*heads, strict=True)], [rows[i] for i in order], left, len(apart))
+    return table
+
+
+def known_within(front: Points) -> np.ndarray:
+    """Least tolerance (m,) within which points were judged to be verified, in the objectives' units; NaN where none was judged."""
+    return np.fmin.reduce(front.tolerances, axis=0, initial=np.nan)
+
+
+def parameters_of(front: Points) -> list[tuple[str, str, list[Any]]]:
+    """Name, unit and the values at all points of static parameters, without trajectories of all variables; nothing if there are many."""
+    each = [point.parameters for point in front]
+    most = max(range(len(each)), key=lambda i: len(each[i]), default=0)
+    if not each or len(each[most]) > MOST_PARAMETERS:
+        return []
+    units = {variable.name: variable.unit for variable in front[most].variables}
+    return [(name, units.get(name, ""), [one.get(name) for one in each]) for name in each[most]]
 
 
 def _is_vector(front: Points) -> bool:

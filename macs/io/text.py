@@ -22,10 +22,11 @@ def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], 
     return "\n".join(line.rstrip() for line in lines)
 
 
-def numbers(values: Any) -> list[str]:
-    """A column of numbers with the same number of decimals: six significant digits, and at least four of the column's range.
+def numbers(values: Any, tolerance: float = np.nan) -> list[str]:
+    """A column of numbers with the same number of decimals: those within which they are known, and at least four digits of their range.
 
-    A number that would have fewer than five significant digits has more decimals, unless it is less than a millionth of the largest; the
+    Without a `tolerance` in the column's unit, or where the numbers differ by no more, there are six significant digits and at least four
+    of the column's range; one that would have fewer than five has more decimals, unless it is less than a millionth of the largest. The
     decimal points stay below each other.
     """
     values = np.asarray(values, dtype=float) + 0.0
@@ -33,15 +34,17 @@ def numbers(values: Any) -> list[str]:
     largest = np.abs(finite).max(initial=0.0)
     if largest and not 1e-3 <= largest < 1e8:
         return [f"{value:.5e}" for value in values]
-    digits = 5 - _decade(largest)
     span = np.ptp(finite) if len(finite) else 0.0
-    if span > 1e-9 * largest:
+    known = span > tolerance > 0
+    digits = -_decade(tolerance) if known else 5 - _decade(largest)
+    if span > max(1e-9 * largest, np.nan_to_num(tolerance)):
         digits = max(digits, 3 - _decade(span))
     digits = int(np.clip(digits, 0, 11 - _decade(largest)))
-    small = np.isfinite(values) & (np.abs(values) >= 1e-6 * largest) & (values != 0)
+    small = np.isfinite(values) & (np.abs(values) >= 1e-6 * largest) & (values != 0) & (not known)
     own = [max(digits, 4 - _decade(abs(value))) if more else digits for value, more in zip(values, small.tolist(), strict=True)]
     width = max(own, default=0)
-    return [f"{value:.{n}f}{' ' * (width - n + (n == 0 < width))}" for value, n in zip(values, own, strict=True)]
+    shown = [f"{value:.{n}f}{' ' * (width - n + (n == 0 < width))}" for value, n in zip(values, own, strict=True)]
+    return [text.replace("-", "", 1) if not float(text) else text for text in shown]
 
 
 def counted(number: int, what: str) -> str:

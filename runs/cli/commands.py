@@ -126,7 +126,11 @@ def show(arguments: Namespace) -> int:
     point = None if arguments.point is None else find_point(front, arguments.point)
     if arguments.plot and point is not None and front.dynamic and point.trajectory is None:
         raise WrongCall(f"point {arguments.point} has no trajectory to draw")
-    print("\n\n".join(filter(None, (front.table(), solves_table(front)))) if point is None else describe(front, point))
+    print(
+        "\n\n".join(filter(None, (front.table(details=arguments.details), solves_table(front))))
+        if point is None
+        else describe(front, point)
+    )
     if arguments.plot:
         draw(front if point is None else point, arguments.plot, costates=arguments.costates)
     if arguments.csv:

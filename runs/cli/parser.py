@@ -244,6 +244,7 @@ def _add_show(commands: argparse._SubParsersAction[Parser]) -> None:
     show = _add(commands, "show", "a saved front: its table, a picture, an export")
     show.add_argument("front", metavar="FRONT.nc")
     show.add_argument("--point", metavar="I", type=int, help="only this point, in detail; --plot draws its flight")
+    show.add_argument("--details", action="store_true", help="with violation, defect, optimality and the like")
     show.add_argument("--plot", metavar="FILE.png", help="draw it")
     show.add_argument("--costates", action="store_true", help="with --point and --plot: costates and the Hamiltonian, too")
     show.add_argument("--csv", metavar="FILE", help="a table for a spreadsheet: a row for each point, or with --point for each node")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic_fronts import black_box, compiled, empty, flights, state_problem
+from synthetic_fronts import black_box, compiled, empty, flights, marked, state_problem
 
 from macs.front import Front
 from macs.fronts.point import Point
@@ -118,7 +118,18 @@ def test_points_of_different_meshes_merge_and_keep_their_own():
     for point in merged:
         assert [v.name for v in point.variables] == [f"climb.u[{i}]" for i in range(len(point.decision))]
         assert np.isfinite(point.decision).all()
-    assert "2 meshes" in merged.table() and "elements" in merged.table()
+    assert "2 meshes" in merged.table() and "elements" in merged.table(details=True)
+
+
+def test_what_is_as_it_should_be_needs_no_details_and_parameters_are_shown():
+    front = marked(flights(4), [True] * 4).replace(status=["converged"] * 4)
+    parameters = [f"{flight.parameters['mass']:.5f}" for flight in front.trajectories]
+    plain, full = front.table(), front.table(details=True)
+    assert plain.splitlines()[2].split() == ["#", "time", "height", "mass", "status"]
+    assert [line.split()[3] for line in plain.splitlines()[5:9]] == parameters
+    assert [word in full for word in ("violation", "defect", "off by")] == [True] * 3
+    assert "defect" in front.replace(verified=[True, False, True, True]).table(), "a point is not verified"
+    assert "violation" in front.replace(status=["converged"] * 3 + ["infeasible"]).table()
 
 
 def test_fronts_of_different_things_do_not_merge():
@@ -170,4 +181,8 @@ def test_numbers_show_what_differs():
     assert numbers([np.inf, 5.35104, np.nan]) == ["inf", "5.35104", "nan"], "what is no number has no digits"
     assert numbers([-0.0, 0.0]) == ["0.00000", "0.00000"]
     assert numbers([1e-9, 2e-9]) == ["1.00000e-09", "2.00000e-09"]
+    assert numbers([2.97e-6, 0.159072, 0.90389], 9e-4) == ["0.0000", "0.1591", "0.9039"], "as far as they are verified"
+    assert numbers([-2.97e-7, 0.159072, 0.90389], 9e-6) == ["0.000000", "0.159072", "0.903890"]
+    assert numbers([109.09461, 250], 10.0) == ["109.1", "250.0"], "four digits of the range in any case"
+    assert numbers([5.0, 5.00001], 1e-3) == ["5.00000", "5.00001"], "no digits of round-off"
     assert [duration(s) for s in (0.0123, 3.61, 59.7, 61, 7384)] == ["0.012 s", "3.6 s", "60 s", "1 min 01 s", "2 h 03 min"]

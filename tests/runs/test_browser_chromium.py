@@ -65,6 +65,24 @@ def test_a_page_opens_with_the_knee_and_its_trajectory(browser, tmp_path):
     assert errors(browser) == []
 
 
+def test_numbers_are_those_of_the_table_and_details_are_shown_on_demand(browser, tmp_path):
+    front = marked(flights(4), [True] * 4)
+    cells = "return [...document.querySelectorAll('#table tbody tr')].map((row) => [...row.cells].map((one) => one.textContent))"
+    heads = "return [...document.querySelectorAll('#table th button')].map((one) => one.textContent)"
+    show(browser, tmp_path, front_page(front))
+    assert browser.execute_script(heads) == ["#", "time", "height", "mass", "status"]
+    assert browser.execute_script(cells) == [line.split() for line in front.table().splitlines()[5:9]]
+    time, height = front.table().splitlines()[6].split()[1:3]
+    assert browser.execute_script("return inWords(state.points[1])") == f"time {time} s, height {height} km"
+    browser.execute_script("byId('table-details').querySelector('input').click()")
+    assert "defect" in browser.execute_script(heads) and "defect" in browser.execute_script("return byId('point').textContent")
+    show(browser, tmp_path, front_page(marked(flights(4), [True, False, True, True])))
+    assert "defect" in browser.execute_script(heads) and browser.execute_script(
+        "return byId('table-details').querySelector('input').checked"
+    )
+    assert errors(browser) == []
+
+
 @pytest.mark.slow
 def test_rows_are_reached_and_selected_by_keys_and_sorted_by_titles(browser, tmp_path):
     from selenium.webdriver.common.keys import Keys

@@ -16,6 +16,7 @@ from problems.compiled import Objective
 from ...io.atomic import write_whole
 from ...io.text import counted, numbers
 from ..curve import curve_of
+from ..tables import known_within
 from .style import (
     COLORS,
     GREY,
@@ -184,7 +185,7 @@ def _about(values: np.ndarray) -> tuple[float, float] | None:
 
 def _value(front: Any, number: int, k: int) -> str:
     """An objective of a point with its unit, as tables have it."""
-    text = numbers(front.objectives[:, k])[number].strip()
+    text = numbers(front.objectives[:, k], known_within(front)[k])[number].strip()
     return f"{text} {raised(front.goals[k].unit)}".rstrip()
 
 

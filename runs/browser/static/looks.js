@@ -62,7 +62,8 @@ const hoverData = (point) => [point.key, plotText(pointName(point)), statusOf(po
 function hoverTemplate() {
   const lines = state.comparison.goals.map((goal, i) => {
     const [name, unit] = [goal.name, goal.unit].map((text) => plotText(text).replace(/[{}%]/g, ""));
-    return `${name} %{customdata[${i + 3}]:.6~g}${unit ? ` ${unit}` : ""}`;
+    const digits = state.decimals[i] === null ? ".6~g" : `.${state.decimals[i]}f`;
+    return `${name} %{customdata[${i + 3}]:${digits}}${unit ? ` ${unit}` : ""}`;
   });
   return ["<b>%{customdata[1]}</b>, %{customdata[2]}", ...lines].join("<br>") + "<extra></extra>";
 }

@@ -12,6 +12,7 @@ function begin() {
     resetView();
     buildChoices();
     buildPreferences();
+    buildDetails();
     refresh();
     showStudy();
   });
@@ -72,7 +73,7 @@ function showAbout() {
 function reading(about) {
   const how = about.dynamic ? "simulated by an independent integrator" : "evaluated again";
   if (about.tolerance === null) return "The points were not simulated.";
-  return `Points are verified where nothing differs by more than ${number(about.tolerance)} when they are ${how}. Curves have 6 digits of their range; all other numbers are as in the front's file.`;
+  return `Points are verified where nothing differs by more than ${number(about.tolerance)} when they are ${how}. Objectives have the digits within which they are verified, and at least 4 of their range; curves have 6. The front's file has all digits.`;
 }
 
 /** The kind of figure, as tabs, and the objectives on its axes. */

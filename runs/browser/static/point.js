@@ -18,7 +18,7 @@ function showPoint() {
     element("button", { type: "button", id: "keep", "aria-pressed": String(kept), onclick: () => keep(point.key, !kept) }, kept ? "Kept: let go" : "Keep its trajectory"),
   );
   const rest = element("div", {}, element("p", { class: "note" }, "loading\u2026"));
-  fill(place, element("p", {}, element("strong", {}, pointName(point)), " ", badge(point)), objectivesTable(point), factsTable(point), buttons, rest);
+  fill(place, element("p", {}, element("strong", {}, pointName(point)), " ", badge(point)), objectivesTable(point), isDetailed(point) ? factsTable(point) : null, buttons, rest);
   details(point.run).then(
     (all) => {
       if (state.selected === point.key) fill(rest, restOf(point, all[point.index]));
@@ -41,13 +41,15 @@ function badge(point) {
   return counts(point) ? text : element("span", { class: "badge" }, text);
 }
 
+const isDetailed = (point) => detailed() || !counts(point);
+
 function objectivesTable(point) {
   const { goals } = state.comparison;
-  const simulated = point.simulated.some((value) => value !== null);
+  const simulated = isDetailed(point) && point.simulated.some((value) => value !== null);
   const head = element("tr", {}, ...["objective", "value", ...(simulated ? ["simulated"] : [])].map((words, k) => element("th", { scope: "col", class: k ? "" : "words" }, words)));
   const rows = goals.map((goal, i) => {
     const cells = [point.values[i], ...(simulated ? [point.simulated[i]] : [])];
-    return element("tr", {}, element("th", { scope: "row" }, withUnit(goal.name, goal.unit)), ...cells.map((value) => element("td", { class: "number" }, number(value, 7))));
+    return element("tr", {}, element("th", { scope: "row" }, withUnit(goal.name, goal.unit)), ...cells.map((value) => element("td", { class: "number" }, isDetailed(point) ? number(value, 7) : fixed(value, state.decimals[i]))));
   });
   return element("table", { class: "facts" }, element("thead", {}, head), element("tbody", {}, rows));
 }

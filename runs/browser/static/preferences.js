@@ -62,7 +62,8 @@ function showPreferences() {
       slider.value = range ? range[which] : which === 0 ? ends.min : ends.max;
       // What is typed stays as it is typed.
       if (document.activeElement !== typed || !range) typed.value = range ? Number(range[which].toPrecision(Math.min(digits, 15))) : "";
-      typed.placeholder = Number((which === 0 ? low : high).toPrecision(5));
+      const end = which === 0 ? low : high;
+      typed.placeholder = state.decimals[i] === null ? Number(end.toPrecision(5)) : end.toFixed(state.decimals[i]);
     });
   });
   const shown = shownPoints().length, wanted = wantedPoints().length;

@@ -10,6 +10,8 @@ const state = {
   byKey: new Map(),
   selected: null, // key of a point
   kept: [], // keys of points whose trajectories stay
+  decimals: [], // of each objective, as far as its points are verified; null: not known
+  details: null, // whether violation, defect and the like are shown; null: only where a point is not as it should be
   ranges: [], // of each objective [least, greatest], or null
   hidden: new Set(), // solvers
   run: "", // number of the run that is shown; "": all
@@ -24,6 +26,10 @@ function take(comparison) {
   state.comparison = comparison;
   state.points = comparison.runs.flatMap((run) => pointsOf(run));
   state.byKey = new Map(state.points.map((point) => [point.key, point]));
+  state.decimals = comparison.goals.map((_, i) => {
+    const known = comparison.runs.map((run) => run.points.tolerances[i]).filter((one) => one !== null);
+    return decimalsWithin(state.points.map((point) => point.values[i]), Math.min(...known));
+  });
 }
 
 /** Show a comparison from its beginning: a point in the middle selected, nothing hidden. */
@@ -84,6 +90,8 @@ function pointsOf(run) {
 
 /** Whether a point is good: not one that a simulation does not confirm, and feasible. */
 const counts = (point) => point.verified !== false && point.status === "converged";
+
+const detailed = () => state.details ?? !state.points.every(counts);
 
 const statusOf = (point) => {
   if (point.status !== "converged" || point.verified === null) return point.status;
@@ -148,7 +156,7 @@ function announce(text) {
 
 /** The objectives of a point in words. */
 const inWords = (point) =>
-  state.comparison.goals.map((goal, i) => `${goal.name} ${number(point.values[i])}${goal.unit ? ` ${goal.unit}` : ""}`).join(", ");
+  state.comparison.goals.map((goal, i) => `${goal.name} ${fixed(point.values[i], state.decimals[i])}${goal.unit ? ` ${goal.unit}` : ""}`).join(", ");
 
 /** The name of a point: of one run its number, of several solver and run before it. */
 function pointName(point) {

@@ -15,14 +15,30 @@ function tableColumns() {
   const all = [
     ...(several ? [{ title: "solver", words: true, value: (p) => p.solver, text: texts }, { title: "run", value: (p) => p.run.number, text: texts }] : []),
     { title: several ? "point" : "#", value: (p) => p.index, text: texts },
-    ...goals.map((goal, i) => ({ title: goal.name, unit: `${goal.sense.slice(0, 3)} [${goal.unit || "-"}]`, value: (p) => p.values[i], text: column })),
-    { title: "violation", value: (p) => p.violation, text: smalls },
-    { title: "defect", unit: how, value: (p) => p.defect, text: smalls, optional: true, hidden: !dynamic },
-    { title: "violation", unit: how, value: (p) => p.simulatedViolation, text: smalls, optional: true },
-    { title: "optimality", value: (p) => p.optimality, text: smalls, optional: true },
+    ...goals.map((goal, i) => ({ title: goal.name, unit: `${goal.sense.slice(0, 3)} [${goal.unit || "-"}]`, value: (p) => p.values[i], text: (values) => (state.decimals[i] === null ? column(values) : values.map((value) => fixed(value, state.decimals[i]))) })),
+    ...(state.comparison.runs.find((run) => run.points.parameters.length)?.points.parameters ?? []).map((one, k) => {
+      const words = one.values.some((value) => typeof value === "string");
+      return { title: one.name, unit: `[${one.unit || "-"}]`, words, value: (p) => p.run.points.parameters[k]?.values[p.index] ?? null, text: words || one.values.every(Number.isInteger) ? texts : column };
+    }),
+    { title: "violation", value: (p) => p.violation, text: smalls, hidden: !detailed() },
+    { title: "defect", unit: how, value: (p) => p.defect, text: smalls, optional: true, hidden: !dynamic || !detailed() },
+    { title: "violation", unit: how, value: (p) => p.simulatedViolation, text: smalls, optional: true, hidden: !detailed() },
+    { title: "optimality", value: (p) => p.optimality, text: smalls, optional: true, hidden: !detailed() },
     { title: "status", words: true, value: statusOf, text: texts },
   ];
   return all.filter((one) => !one.hidden && (!one.optional || state.points.some((point) => one.value(point) !== null)));
+}
+
+/** Whether violation, defect, optimality and the like are shown, of the table and of the selected point. */
+function buildDetails() {
+  const change = (event) => {
+    const by = tableColumns()[table.by];
+    state.details = event.target.checked;
+    table.by = Math.max(0, tableColumns().findIndex((one) => one.title === by.title && one.unit === by.unit));
+    showTable();
+    showPoint();
+  };
+  fill(byId("table-details"), element("label", {}, element("input", { type: "checkbox", checked: detailed(), onchange: change }), " violation, defect, optimality"));
 }
 
 /** The wanted points in the order of the table. */

@@ -4,8 +4,9 @@
 const MINUS = "\u2212";
 const DIGIT_SPACE = "\u2007", POINT_SPACE = "\u2008"; // as wide as a digit and as a point
 
-/** A number with some significant digits; "-" where there is none. */
+/** A number with some significant digits; "-" where there is none; a word as it is. */
 function number(value, digits = 6) {
+  if (typeof value === "string") return value;
   if (value === null || value === undefined || Number.isNaN(value)) return "-";
   if (value === 0) return "0";
   const size = Math.abs(value);
@@ -38,6 +39,18 @@ function column(values) {
   const rest = (n) => (n === 0 && width > 0 ? POINT_SPACE : "") + DIGIT_SPACE.repeat(width - n);
   return values.map((value, k) => (Number.isFinite(value) ? (value + 0).toFixed(own[k]).replace(/^-/, MINUS) + rest(own[k]) : "-"));
 }
+
+/** Decimals of numbers that are known within a tolerance, at least four digits of their range; null where that is not known, or they are equal. */
+function decimalsWithin(values, tolerance) {
+  const [low, high] = extent(values);
+  const largest = Math.max(Math.abs(low), Math.abs(high));
+  if (!(tolerance > 0 && high - low > tolerance) || largest < 1e-3 || largest >= 1e8) return null;
+  const decade = (value) => Math.floor(Math.log10(value));
+  return Math.min(Math.max(-decade(tolerance), 3 - decade(high - low), 0), 11 - decade(largest));
+}
+
+/** A number with so many decimals; without them with six digits. */
+const fixed = (value, decimals) => (decimals === null || !Number.isFinite(value) ? number(value) : value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "").replace("-", MINUS));
 
 const withUnit = (name, unit) => (unit ? `${name} [${unit}]` : name);
 const grouped = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, "\u202f");
