@@ -281,6 +281,11 @@ class Points:
         return ~np.isnan(self.defect)
 
     @property
+    def resolution(self) -> np.ndarray:
+        """Least tolerance (m,) of a point in each objective, in its unit: as far as its digits are verified; NaN where none was judged."""
+        return np.fmin.reduce(self.tolerances, axis=0, initial=np.nan)
+
+    @property
     def gain(self) -> np.ndarray:
         """What other controls would gain in all objectives together (n,), to first order, in what counts as one in each; NaN: not known."""
         weights = [np.full(len(self.goals), np.nan) if one is None else one.weights for one in self.costates]

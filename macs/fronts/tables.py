@@ -77,7 +77,7 @@ def _table(front: Points, columns: Mapping[str, Sequence[Any]], details: bool) -
     details = details or outside or bool((front.status != CONVERGED).any() or (was & ~front.verified).any())
     # Title and unit, cells, and whether they are flush left.
     table: list[tuple[tuple[str, str], Sequence[str], bool]] = [(("#", ""), [str(i) for i in range(len(front))], False)]
-    for goal, values, tolerance in zip(front.goals, front.objectives.T, known_within(front), strict=True):
+    for goal, values, tolerance in zip(front.goals, front.objectives.T, front.resolution, strict=True):
         table.append(((goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]"), numbers(values, tolerance), False))
     for name, unit, values in parameters_of(front):
         words = not all(isinstance(value, float) for value in values)
@@ -110,11 +110,6 @@ def _residuals(front: Points) -> list[tuple[tuple[str, str], Sequence[str], bool
     if any(value is not None for value in front.optimality):
         table.append((("optimality", ""), _small(front.optimality), False))
     return table
-
-
-def known_within(front: Points) -> np.ndarray:
-    """Least tolerance (m,) within which points were judged to be verified, in the objectives' units; NaN where none was judged."""
-    return np.fmin.reduce(front.tolerances, axis=0, initial=np.nan)
 
 
 def parameters_of(front: Points) -> list[tuple[str, str, list[Any]]]:

@@ -12,7 +12,7 @@ import numpy as np
 from macs.front import Front
 from macs.fronts.pictures.flight_plot import costate_ranges
 from macs.fronts.point import Point
-from macs.fronts.tables import footer, headline, known_within, parameters_of
+from macs.fronts.tables import footer, headline, parameters_of
 from macs.io.text import per
 from problems.compiled import Limit, Objective, Variable
 from transcription.trajectories.costates import Costates, has_length
@@ -64,7 +64,7 @@ def columns(front: Front) -> dict[str, Any]:
     was = front.was_simulated
     return {
         "count": len(front),
-        "tolerances": finite(known_within(front)),
+        "tolerances": finite(front.resolution),
         "parameters": [{"name": name, "unit": unit, "values": values} for name, unit, values in parameters_of(front)],
         "objectives": [finite(column) for column in front.objectives.T],
         "simulated": [finite(column * sign) for column, sign in zip(front.simulated_F.T, front.signs, strict=True)],

@@ -16,7 +16,6 @@ from problems.compiled import Objective
 from ...io.atomic import write_whole
 from ...io.text import counted, numbers
 from ..curve import curve_of
-from ..tables import known_within
 from .style import (
     COLORS,
     GREY,
@@ -185,7 +184,7 @@ def _about(values: np.ndarray) -> tuple[float, float] | None:
 
 def _value(front: Any, number: int, k: int) -> str:
     """An objective of a point with its unit, as tables have it."""
-    text = numbers(front.objectives[:, k], known_within(front)[k])[number].strip()
+    text = numbers(front.objectives[:, k], front.resolution[k])[number].strip()
     return f"{text} {raised(front.goals[k].unit)}".rstrip()
 
 
