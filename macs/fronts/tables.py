@@ -98,7 +98,7 @@ def _table(front: Points, columns: Mapping[str, Sequence[Any]], details: bool) -
     return _Table([*zip(*heads, strict=True)], [rows[i] for i in order], left, len(apart))
 
 
-def _residuals(front: Points) -> list[tuple[tuple[str, str], Sequence[str], bool]]:
+def _residuals(front: Points) -> Sequence[tuple[tuple[str, str], Sequence[str], bool]]:
     """Columns of a table: by how much points violate constraints, differ from their simulation, and miss the conditions of an optimum."""
     table = [(("violation", ""), _small(front.violation), False)]
     vector = _is_vector(front)
