@@ -21,9 +21,6 @@ from .points import Points
 from .provenance import COUNTED_BY
 from .verified import AGAIN, MISSES, constant_objectives, missed, untrusted
 
-MOST_PARAMETERS = 6
-"""Number of parameters up to which a table has them."""
-
 
 def front_table(front: Points, columns: Mapping[str, Sequence[Any]] | None = None, details: bool = False) -> str:
     """Text with a headline, a row for each point and a footer; see `Front.table`.
@@ -112,11 +109,11 @@ def _residuals(front: Points) -> Sequence[tuple[tuple[str, str], Sequence[str], 
     return table
 
 
-def parameters_of(front: Points) -> list[tuple[str, str, list[Any]]]:
-    """Name, unit and the values at all points of static parameters, without trajectories of all variables; nothing if there are many."""
+def parameters_of(front: Points, few: int = 6) -> list[tuple[str, str, list[Any]]]:
+    """Name, unit and the values at all points of static parameters, without trajectories of all variables, if they are `few`."""
     each = [point.parameters for point in front]
     most = max(range(len(each)), key=lambda i: len(each[i]), default=0)
-    if not each or len(each[most]) > MOST_PARAMETERS:
+    if not each or len(each[most]) > few:
         return []
     units = {variable.name: variable.unit for variable in front[most].variables}
     return [(name, units.get(name, ""), [one.get(name) for one in each]) for name in each[most]]
