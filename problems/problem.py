@@ -102,11 +102,17 @@ class Problem:
         self._phases[name]._owner = self
         return self._phases[name]
 
-    def parameter(self, name: str, *, bounds: Any, unit: str = "", scale: float | None = None) -> ca.MX:
-        """Add a static decision variable within finite bounds; returns its symbol, usable in any expression of any phase."""
+    def parameter(self, name: str, *, bounds: Any, unit: str = "", scale: float | None = None, integer: bool = False) -> ca.MX:
+        """Add a static decision variable within finite bounds; returns its symbol, usable in any expression of any phase.
+
+        `integer`: a whole number within the bounds, which belong to it, such as a number of engines or of revolutions. Gradient solves keep
+        those of their start; of up to 20 combinations of values each is solved, of more the optimum for real numbers, rounded, and then
+        neighbours of the best until none is better. Expressions have to be defined between whole numbers, too.
+        """
         what = checks.new_name("parameter", name, self._parameters, f"problem '{self.name}'")
-        limits = checks.interval(bounds, f"the bounds of {what}")
-        self._parameters[name] = Variable(name, *limits, checks.unit(unit, what), checks.scale(scale, limits[1] - limits[0] or 1.0, what))
+        limits = checks.whole(bounds, what) if integer else checks.interval(bounds, f"the bounds of {what}")
+        unit, scale = checks.unit(unit, what), checks.scale(scale, limits[1] - limits[0] or 1.0, what)
+        self._parameters[name] = Variable(name, *limits, unit, scale, integer=integer)
         self._symbols[name] = ca.MX.sym(name)
         return self._symbols[name]
 
@@ -165,6 +171,8 @@ class Problem:
             if name not in self._parameters:
                 raise ValueError(f"{what}: there is no such parameter; there are {', '.join(self._parameters) or 'none'}")
             self._guesses[name] = checks.guessed(checks.number(value, what), self._parameters[name], what)
+            if self._parameters[name].integer and value != round(value):
+                raise ValueError(f"{what} must be a whole number, not {value:g}")
 
     def compile(self) -> CompiledProblem:
         """Check the whole and turn it into plain data and named CasADi Functions, which pickle.

@@ -198,7 +198,7 @@ class Assembly:
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]
         phases = tuple(writer.unpack(extended) for writer in self._declared)
         slots = zip(self.problem.parameters, self.parameters, strict=True)
-        return Trajectory(phases, {v.name: float(extended[slot]) for v, slot in slots})
+        return Trajectory(phases, {v.name: v.meant(float(extended[slot])) for v, slot in slots})
 
     def costates(self, rows: Rows, z: np.ndarray, multipliers: np.ndarray) -> dict[str, PiecewisePolynomial]:
         extended = self.layout.extended(np.asarray(z, dtype=float)[None])[0]

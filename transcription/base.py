@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import MISSING, dataclass
+from dataclasses import MISSING, dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -272,6 +272,23 @@ class NLP(Deriving):
         return np.array([i for i in self.free if self.variables[i].name in names], dtype=int)
 
     @cached_property
+    def integers(self) -> np.ndarray:
+        """Which variables (k,) are whole numbers: every solve keeps those of its start."""
+        return np.flatnonzero([v.integer for v in self.variables])
+
+    @cached_property
+    def relaxed(self) -> NLP:
+        """The same NLP with real numbers for whole ones."""
+        return replace(self, variables=tuple(replace(v, integer=False) for v in self.variables))
+
+    def rounded(self, Z: np.ndarray) -> np.ndarray:
+        """Vectors (..., n) with whole numbers where they are meant."""
+        if len(self.integers):
+            Z = Z.copy()
+            Z[..., self.integers] = Z[..., self.integers].round()
+        return Z
+
+    @cached_property
     def scale(self) -> np.ndarray:
         """The scales of the variables (n,)."""
         return np.array([v.scale for v in self.variables])
@@ -283,12 +300,12 @@ class NLP(Deriving):
 
     def first_guess(self, candidates: np.ndarray) -> np.ndarray:
         """Vectors (k, n) for a solver to begin from: those `guessed` of candidates (k, d), with the peaks that belong to them."""
-        return self.tighten(self.guessed(candidates))
+        return self.tighten(self.rounded(self.guessed(candidates)))
 
     def propagate(self, Z: np.ndarray) -> np.ndarray:
         """The states (k, n) that the dynamics give to the free entries of vectors (k, n), by propagation; not numbers, or short of the
         equations, where that fails."""
-        return self.reduced.propagate(Z).Z
+        return self.reduced.propagate(self.rounded(Z)).Z
 
     def propagate_and_score(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Propagated vectors (k, n), their objectives (k, m) and their residuals (k, n + r): `propagate`, then `residuals`, at once where

@@ -16,7 +16,7 @@ from transcription.nlp.scalarized import Solved, scalarize
 from transcription.smooth import Smooth
 
 from ..io.workers import each
-from .evaluator import Counts, Evaluation, Evaluator
+from .evaluator import Counts, Evaluation, Evaluator, masks
 
 SOLVE_ITERATIONS = 100
 """Iterations after which a gradient solve is given up. Most need some tens; the time of a long one is better spent on others. Where all are
@@ -43,6 +43,7 @@ class Bilevel(Evaluator):
         self.nlp, self.inner, self.tolerance, self.start = nlp, inner, tolerance, start
         self.free = nlp.free
         self.lower, self.upper, self.period = nlp.lower[nlp.free], nlp.upper[nlp.free], nlp.period[nlp.free]
+        self.kinds = masks([nlp.variables[i] for i in nlp.free])
         self.m_known = len(nlp.problem.goals)
         self.moves = inner.moves
         self.ways = tuple(type(one).__name__.lower() for one in inner.ways)

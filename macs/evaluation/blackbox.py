@@ -17,7 +17,7 @@ from transcription.trajectories.limits import excess
 
 from ..io.interrupts import at_once
 from ..io.workers import each
-from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator
+from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator, masks
 
 log = logging.getLogger(__name__)
 
@@ -42,8 +42,7 @@ class BlackBox(Evaluator):
         self.lower, self.upper = (np.array([getattr(v, side) for v in problem.variables]) for side in ("lower", "upper"))
         self.period = np.array([v.period or 0.0 for v in problem.variables])
         self.free = np.arange(len(problem.variables))
-        whole = np.array([v.integer for v in problem.variables], dtype=bool)
-        self.kinds = (whole, np.array([bool(v.choices) for v in problem.variables])) if whole.any() else (None, None)
+        self.kinds = masks(problem.variables)
         self.known_designs: dict[bytes, np.ndarray] = {}
         self.apart = apart or problem.by_row  # whether each row is evaluated by itself
         self._columns: Sequence[int] = (len(problem.goals), len(problem.limits)) if problem.goals and problem.limits is not None else ()

@@ -16,13 +16,22 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from problems.checks import short_repr
-from problems.compiled import Objective
+from problems.compiled import Objective, Variable
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
 from ..io.interrupts import purpose
 from ..io.text import counted
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
+
+
+Kinds = tuple[np.ndarray, np.ndarray] | tuple[None, None]
+
+
+def masks(variables: Sequence[Variable]) -> Kinds:
+    """Which variables (d,) are whole numbers, and which of these are numbers of choices; None and None if all are real."""
+    whole = np.array([v.integer for v in variables], dtype=bool)
+    return (whole, np.array([bool(v.choices) for v in variables])) if whole.any() else (None, None)
 
 
 @dataclass(frozen=True)
@@ -265,7 +274,7 @@ class Evaluator(ABC):
     period : array (d,)
         Period of a periodic free variable, whose bounds are one period wide; 0 for other variables.
     kinds : pair of arrays (d,) of bool
-        Which free variables are whole numbers, and which of these are numbers of choices; None and None if all are real.
+        See `masks`.
     tolerance : float
         A point whose violation is at most this is feasible.
     has_gradients : bool
@@ -293,7 +302,7 @@ class Evaluator(ABC):
     lower: np.ndarray
     upper: np.ndarray
     period: np.ndarray
-    kinds: tuple[np.ndarray, np.ndarray] | tuple[None, None] = (None, None)
+    kinds: Kinds = (None, None)
     tolerance: float
     has_gradients: bool = False
     moves: bool = False

@@ -478,12 +478,14 @@ def read_flights(root: Labelled, phases: Mapping[str, Group]) -> dict[str, Any]:
     columns, adjoints = zip(*(read_phase(name, group, root.sizes["point"]) for name, group in phases.items()), strict=True)
     names = root["parameter"].tolist()
     distinct(names, "parameters")
+    own = {v.name: v for v in read_variables(root, "variable") if v.integer}
     found: list[Trajectory | None] = []
     for parameters, *several in zip(root["parameters"].tolist(), *columns, strict=True):
         known = tuple(phase for phase in several if phase is not None)
         if known and len(known) < len(several):
             raise ValueError("a point has a trajectory in some phases only")
-        found.append(Trajectory(known, dict(zip(names, parameters, strict=True))) if known else None)
+        meant = {name: own[name].meant(value) if name in own else value for name, value in zip(names, parameters, strict=True)}
+        found.append(Trajectory(known, meant) if known else None)
     weights = root["weights"] if "weights" in root.arrays else np.full((len(found), len(root["objective"])), np.nan)
     by_point = [dict(zip(phases, several, strict=True)) for several in zip(*adjoints, strict=True)]
     return {"trajectories": found, "costates": [costates_of_point(*one) for one in zip(weights, by_point, strict=True)]}

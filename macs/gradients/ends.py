@@ -99,11 +99,11 @@ def _lexicographic(solver: MultistartSolver, i: int, optima: Sequence[Solved]) -
     before, least, spans, weak = [i], best.F[i], _spans(optima), False
     for j in (k for k in range(m) if k != i):
         if not solver.is_least(best, Scalarised.single(j, m)):
-            ceiling = np.where(np.isin(np.arange(m), before), best.F, np.inf)
+            limits, slack = np.where(np.isin(np.arange(m), before), best.F, np.inf), END.slack * spans
             with solver.solves.at_most(END.ties):
-                best = without_loss(
-                    solver.from_vector, solver.solves.tolerance, best, Scalarised.single(j, m, ceiling), END.slack * spans, [optima[j].z]
-                )
+                (best,) = solver.over_values([best], [Scalarised.single(j, m, limits + slack)])
+                task = Scalarised.single(j, m, limits)
+                best = without_loss(solver.from_vector, solver.solves.tolerance, best, task, slack, [optima[j].z])
             weak |= best.message == WEAK
         before.append(j)
     # A range may be no more than rounding, where objectives are in no conflict: no solve can tell such a loss.

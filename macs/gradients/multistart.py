@@ -12,9 +12,11 @@ Where one start alone found the best, they are not: the probability is 1 / 2 the
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -46,9 +48,10 @@ class MultistartLimits:
     hopeless: float = 100.0  # scales by which propagated states violate constraints so that the states of the guess are the better start
     better: float = 0.0025  # probability that another start would find a better optimum below which there are enough
     fewest: int = 8  # solves after which none has converged that are enough
-    many: int = 60  # where optima are many: solves that are enough, if there are also `last` times as many as it took to find the best
+    # Where optima are many: solves that are enough, if there are also `last` times as many as it took to find the best, and most of all.
+    many: tuple[int, int] = (60, 200)
     last: int = 2  # also the multiple of the work for starts where the best of several optima was found once: that is no proof
-    most: int = 200
+    values: tuple[int, int] = (20, 2)  # most combinations of whole numbers of which each is solved, until so often nothing is feasible
     same: float = 1e-3  # losses that differ by less are of one optimum: as a part of the differences between all optima,
     rounding: float = 1e-5  # and of their size; see also `MultistartStopping.accuracy`
 
@@ -79,7 +82,7 @@ class Starts:
         self._nlp, self._rng, self.drawn = nlp, rng, drawn
 
     def draw(self, best: np.ndarray | None = None) -> np.ndarray:
-        """The next start, a full vector; `best` (n,) is the best known vector. Returns (1 or 2, n)."""
+        """The next start, a full vector, with the whole numbers of the best known vector (n,), `best`. Returns (1 or 2, n)."""
         nlp, rng, first = self._nlp, self._rng, MULTISTART.everywhere
         drawn, self.drawn = self.drawn, self.drawn + 1
         lower, span = nlp.lower[nlp.free], nlp.span[nlp.free]
@@ -88,6 +91,8 @@ class Starts:
             return self._propagated(self._moved(best, candidates))[:1]
         shape, propagate = KINDS[(drawn if drawn < first else first + (drawn - first) // 2) % len(KINDS)]
         guessed = nlp.first_guess(candidates if shape is None else shape.shaped(nlp, candidates))[0]
+        if best is not None:
+            guessed[nlp.integers] = best[nlp.integers]
         return self._propagated(guessed) if propagate else guessed[None]
 
     def _moved(self, best: np.ndarray, candidates: np.ndarray) -> np.ndarray:
@@ -100,6 +105,7 @@ class Starts:
             deviation[profile.columns] *= np.exp(-(((profile.places - middle) / width) ** 2))
         moved = best.copy()
         moved[nlp.free] += deviation
+        moved[nlp.integers] = best[nlp.integers]
         return moved
 
     def _propagated(self, z: np.ndarray) -> np.ndarray:
@@ -175,7 +181,7 @@ class MultistartStopping:
             return MULTISTART.fewest - self.starts
         if self.convex:
             return 0
-        many, optima = min(max(MULTISTART.many, MULTISTART.last * self._last), MULTISTART.most), self.optima()
+        many, optima = int(np.clip(MULTISTART.last * self._last, *MULTISTART.many)), self.optima()
         # The least k with optima <= better k (k - 1). Where one start alone found the best, small valleys may be deep: a new one is better
         # with probability 1 / 2 then.
         weight = optima * ((optima + 1) / 2 if self.found_once else 1)
@@ -211,6 +217,7 @@ class MultistartSolver:
         self.nlp, self.starts, self.solves, self.rng = nlp, starts, solves, rng
         self.stopping, self.most, self._better = dict[int, MultistartStopping](), most, better
         self.closest: Solved | None = None  # what violates least, where nothing is feasible
+        self._missed = Counter[tuple[float, ...]]()  # how many solves with these whole numbers ended at nothing feasible
         self._timed, self._uneven = False, list[int]()  # whether optima for given times were sought, and whose do not fall with time
         self._starts = Starts(nlp, rng)
         Z = np.empty((0, len(nlp.variables))) if given is None else given
@@ -249,7 +256,7 @@ class MultistartSolver:
     def _held(self, start: np.ndarray, task: Scalarised, times: Sequence[np.ndarray]) -> list[Solved]:
         """The results of solves from a vector (n,) for given times (k,) each."""
         with self.solves.at_most(MULTISTART.held):
-            return self.solves.each(self.nlp, [(self._with_times(start, given), task) for given in times], held=self.nlp.times)
+            return self.solves.each(self.nlp, [(self._with(self.nlp.times, start, given), task) for given in times], held=self.nlp.times)
 
     def _added(self, solved: Solved) -> Solved:
         """A result, which is known from now on if it converged."""
@@ -275,13 +282,49 @@ class MultistartSolver:
         self.solves.counts.keep(good.count(False))
         with spending("starts"):
             self.solves.counts.keep(good.count(True))
-        return best
+        return self.over_values(best, tasks)
 
     def better(self, known: Solved, new: Solved, task: Scalarised) -> Solved:
         """The better of two results, the new one of which is then counted as kept."""
         best = min(known, new, key=task.rank)
         self.solves.counts.keep(best is new and new.status == CONVERGED)
         return best
+
+    def over_values(self, found: Sequence[Solved], tasks: Sequence[Scalarised]) -> list[Solved]:
+        """The better of each result and those with other whole numbers.
+
+        Of few combinations each is solved. Of many, the optimum for real numbers, rounded, and then neighbours of the best, which differ in
+        one number by one, until none is better.
+        """
+        return [self._over_values(one, task) for one, task in zip(found, tasks, strict=True)] if len(self.nlp.integers) else list(found)
+
+    @spending("whole numbers")
+    def _over_values(self, best: Solved, task: Scalarised) -> Solved:
+        integers = self.nlp.integers
+        lower, upper = self.nlp.lower[integers], self.nlp.upper[integers]
+        few = np.prod(upper - lower + 1.0) <= MULTISTART.values[0]
+        if few:
+            new = [*product(*(range(int(low), int(high) + 1) for low, high in zip(lower, upper, strict=True)))]
+        else:
+            new = [tuple(self.solves(self.nlp.relaxed, best.z, task).z[integers].round())]
+        tried, steps = {tuple(best.z[integers])}, np.vstack([np.eye(len(integers)), -np.eye(len(integers))])
+        while (new := [one for one in new if one not in tried and self._missed[one] < MULTISTART.values[1]]) and not stopping():
+            with self.solves.at_most(MULTISTART.iterations):
+                solved = self.from_vectors([(self._with_value(best.z, np.array(value), task), task) for value in new])
+            self._missed.update(value for value, one in zip(new, solved, strict=True) if one.violation > self.solves.tolerance)
+            tried |= {*new}
+            for one in solved:
+                best = self.better(best, one, task)
+            new = [] if few else [*dict.fromkeys(map(tuple, np.clip(best.z[integers] + steps, lower, upper)))]
+        return best
+
+    def _with_value(self, z: np.ndarray, value: np.ndarray, task: Scalarised) -> np.ndarray:
+        """The best known feasible vector (n,) with these whole numbers, else this one with them."""
+        same = (self._known.Z[:, self.nlp.integers] == value).all(axis=1)
+        merits = np.where(same, self.merits(task, self._known.F, self._known.violation, strict=True), np.inf)
+        if np.isfinite(merits).any():
+            return self._known.Z[np.argmin(merits)]
+        return self._with(self.nlp.integers, z, value)
 
     def single(self, i: int) -> Solved:
         """The optimum of objective i alone. A solve from the best known vector may fail if that is an optimum of another objective within
@@ -318,6 +361,7 @@ class MultistartSolver:
         with self.solves.at_most(MULTISTART.iterations):
             solved = self.from_vector(self._starts.draw()[0], task)
         self.solves.counts.keep(solved.status == CONVERGED)
+        (solved,) = self.over_values([solved], [task])
         if solved.status != CONVERGED and solved.violation <= self.solves.tolerance:
             return self.from_vector(solved.z, task)
         return self.with_feasible_start(solved, task, tries)
@@ -355,7 +399,7 @@ class MultistartSolver:
                         best = one
         if stopping_rule.convex and (rival := self.rival(best, task)) is not None:
             best = self.better(best, self.from_vector(rival, task, near=True), task)
-        return best, found
+        return self.over_values([best], [task])[0] if found else best, found
 
     @spending("starts")
     def with_feasible_start(self, solved: Solved, task: Scalarised, tries: tuple[int, int] | None = None) -> Solved:
@@ -380,7 +424,7 @@ class MultistartSolver:
         """Vectors (n,) near which something feasible is sought: the best known, one (n,) with its times at their bounds, and drawn ones."""
         known = self.nearest(task)
         yield from () if known is None else (known,)
-        yield from (self._with_times(z, times) for times in self._sides())
+        yield from (self._with(self.nlp.times, z, times) for times in self._sides())
         while True:
             yield self._starts.draw()[0]
 
@@ -409,10 +453,11 @@ class MultistartSolver:
         times = self.nlp.times
         return [self.nlp.upper[times], self.nlp.lower[times]] if len(times) else []
 
-    def _with_times(self, z: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """The vector (n,) with other times (k,)."""
+    @staticmethod
+    def _with(which: np.ndarray, z: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """The vector (n,) with other values (k,) of some variables (k,)."""
         other = z.copy()
-        other[self.nlp.times] = times
+        other[which] = values
         return other
 
     def from_times(self, start: np.ndarray, task: Scalarised, times: Sequence[np.ndarray]) -> list[Solved]:

@@ -57,7 +57,8 @@ def polish(
     objective. 3. Solves for each point from the positions of its neighbours, as long as this finds better points. With more than two
     objectives and few solves, each from the point that is nearest to dominating it. Not where all starts are `alike`. 4. Points slide along
     the front to positions of less energy, and new points fill wide gaps and free places; where the middle of a gap is too far, places
-    nearer to its sides. The ends are then solved once more from their neighbours.
+    nearer to its sides. The ends are then solved once more from their neighbours. After 2 and 4, points are solved with other whole
+    numbers.
 
     If there are few solves, step 2 uses only some points, well spread, and leaves half of the solves for the other steps. The remaining
     points fill free places in the end, if they are not dominated. If the work is asked to end early, no solves are left, and the result is
@@ -76,6 +77,7 @@ def polish(
         if not solves.left:
             return archive
     archive, waiting = _descend(archive, solves, solved, exponent, guide)
+    archive = _with_other_values(archive, solves)
     solves.promise(1)  # and more as long as that helps
     for _ in range(0 if alike else POLISH.rounds):
         better = _helped_by_neighbours(archive, solves)
@@ -90,6 +92,7 @@ def polish(
         if pool is known or np.array_equal(before.F, archive.F):
             break
     archive = archive if alike else _helped_by_neighbours(archive, solves, extremes(archive.F))
+    archive = _with_other_values(archive, solves)
     if len(waiting):
         archive = _thinned(_front(archive.joined(waiting), span), limit, exponent, guide)
     return archive
@@ -202,6 +205,29 @@ def _helped_by_neighbours(archive: Archive, solves: BudgetedSolves, chosen: np.n
         failed += [both[k][None] for k in np.array(some)[~gained]]
     solves.failed_pairs = np.vstack(failed)
     return _front(better.joined(archive), span) if len(better) else archive
+
+
+@spending("whole numbers")
+def _with_other_values(archive: Archive, solves: BudgetedSolves) -> Archive:
+    """The archive after guarded solves of its points with each whole number one less and one more, as long as this finds better points; of
+    the ends, the others of their objectives are lowered."""
+    span, m = ranges(archive.F), archive.F.shape[1]
+    for _ in range(POLISH.rounds):
+        weights, ends = np.tile(span, (len(archive), 1)), extremes(archive.F)
+        weights[ends, np.arange(m)] = 0.0 if m > 1 else span
+        pairs = [(i, z) for i in range(len(archive) if solves.left else 0) for z in solves.neighbours(archive.Z[i])]
+        if not pairs:
+            break
+        rows = np.array([i for i, _ in pairs])
+        solves.promise(len(rows))
+        found = solves(np.array([z for _, z in pairs]), archive.F[rows], weights[rows])
+        change = (archive.F[rows] - found.F) / span
+        gained = (found.status == CONVERGED) & (change.min(axis=1) >= -BETTER) & (change.max(axis=1) > BETTER)
+        solves.results.keep(gained)
+        if not gained.any():
+            break
+        archive = _front(Archive.of(found, gained).joined(archive), span)
+    return archive
 
 
 def _slide(archive: Archive, limit: int, exponent: float | None, guide: Guide | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -391,6 +417,16 @@ class BudgetedSolves:
             if (answer := self._answers.get(task)) is not None:
                 Z[row], F[row], violation[row], status[row] = answer.Z[0], answer.F[0], answer.violation[0], answer.status[0]
         return Evaluation(Z, F, violation, status)
+
+    def neighbours(self, z: np.ndarray) -> np.ndarray:
+        """The vectors (k, D) in which one whole number of a vector (D,) is one less or one more; none where all variables are real."""
+        free, box = self._evaluator.free, self._evaluator.box
+        steps = np.eye(len(free))[np.zeros(len(free), dtype=bool) if box.whole is None else box.whole]
+        near = z[free] + np.vstack([steps, -steps])
+        near = near[((near >= box.lower) & (near <= box.upper)).all(axis=1)]
+        Z = np.tile(z, (len(near), 1))
+        Z[:, free] = near
+        return Z
 
     def feasible(self, found: Evaluation) -> np.ndarray:
         """Mask (k,) of the feasible results, which may include solves that ran out of iterations."""

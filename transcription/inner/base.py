@@ -130,10 +130,10 @@ class InnerSolver(ABC):
 def started(nlp: NLP, candidates: np.ndarray, warm: np.ndarray | None) -> np.ndarray:
     """Vectors (k, n) to start from: the candidates with the states of `warm`, or with guessed ones; peaks need not fit to these."""
     if warm is None:
-        return nlp.guessed(candidates)
+        return nlp.rounded(nlp.guessed(candidates))
     Z = np.array(warm, dtype=float)
     Z[:, nlp.free] = candidates
-    return Z
+    return nlp.rounded(Z)
 
 
 def scored(

@@ -66,7 +66,7 @@ class Ipopt(InnerSolver):
         """One solve a row: projects onto the free variables of `start`, beginning at `guess`."""
         Z, status, iterations = start.copy(), np.full(len(start), FAILED, dtype="<U10"), np.zeros(len(start), dtype=int)
         try:
-            solver, lower, upper = _program(nlp, self, tolerance)
+            solver = _program(nlp, self, tolerance)
         except Stopped:
             return Z, np.full(len(start), TIMEOUT, dtype="<U10"), iterations
         scale, zero = nlp.scale, origin(nlp)
@@ -80,6 +80,7 @@ class Ipopt(InnerSolver):
             if stopping():
                 status[row] = TIMEOUT
                 continue
+            lower, upper = scaled_bounds(nlp, start[row])
             y0 = np.clip((guess[row] - zero) / scale, lower, upper)
             answer = solver(
                 x0=y0, p=start[row, nlp.free], lbx=lower, ubx=upper, lbg=nlp.g_lower / nlp.g_scale, ubg=nlp.g_upper / nlp.g_scale
@@ -92,8 +93,8 @@ class Ipopt(InnerSolver):
 
 
 @remembered
-def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[Watched, np.ndarray, np.ndarray]:
-    """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter, and the bounds of y."""
+def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> Watched:
+    """The nonlinear program in scaled variables y = (z - origin) / scale, with the candidate as its parameter."""
     refuse_dense(nlp)
     y, candidate = ca.MX.sym("y", len(nlp.variables)), ca.MX.sym("candidate", len(nlp.free))
     z = origin(nlp) + y * nlp.scale
@@ -118,7 +119,7 @@ def _program(nlp: NLP, settings: Ipopt, tolerance: float) -> tuple[Watched, np.n
             "ipopt.acceptable_tol": 0.1 * tolerance,
             "ipopt.acceptable_iter": 5,
         }
-    return Watched("inner", parts, options), *scaled_bounds(nlp)
+    return Watched("inner", parts, options)
 
 
 @dataclass(frozen=True)

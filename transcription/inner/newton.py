@@ -108,6 +108,7 @@ class _Going:
         self.free, self.equations = free, np.flatnonzero(nlp.reduced.equation)
         self.origin, self.span, self.period = nlp.lower[free], nlp.span[free], nlp.period[free]
         self.top, self.periodic = self.origin + self.span, bool(self.period.any())
+        self.moving = np.where(np.isin(free, nlp.integers), 0.0, self.span)  # whole numbers stay as they are
         self.walls = np.where(self.period > 0, np.inf, 0.0)
         self.index, self._vectors = np.arange(k), start.copy()
         self.x = self.center = (start[:, free] - self.origin) / self.span
@@ -143,7 +144,7 @@ class _Going:
         rows = np.flatnonzero(watched.any(axis=0))
         box = -self.x[some] - self.walls, 1.0 - self.x[some] + self.walls
         scale, equation = reduced.scale[rows], reduced.equation[rows]
-        A = reduced.derivatives(propagated, rows) * (self.span / scale[:, None])
+        A = reduced.derivatives(propagated, rows) * (self.moving / scale[:, None])
         values = propagated.values[:, rows]
         lower, upper = (reduced.lower[rows] - values) / scale, (reduced.upper[rows] - values) / scale
         multipliers = self.multipliers[some][:, rows]

@@ -40,7 +40,7 @@ def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max
     weights = _weights(nlp)
     gaps = weights * np.maximum(nlp.residuals(start[None])[1][0, len(start) :], 0.0)
     limits = nlp.g_lower * weights / nlp.g_scale, nlp.g_upper * weights / nlp.g_scale
-    (lower, upper), none = scaled_bounds(nlp), np.zeros(2 * len(weights))
+    (lower, upper), none = scaled_bounds(nlp, start), np.zeros(2 * len(weights))
     answer = run(
         # Rows may give way by a hundredth of their scales more than they miss: that is inside.
         x0=np.concatenate([(start - origin(nlp)) / nlp.scale, gaps + 0.01, gaps + 0.01]),

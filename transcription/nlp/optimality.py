@@ -84,6 +84,7 @@ class Linearised:
         natural = nlp_scales(nlp)
         scales = natural if F_scales is None else np.where(np.asarray(F_scales) > 0, F_scales, natural)
         unit = units(nlp)
+        unit[nlp.integers] = 0.0  # they have no derivatives
         dF = (dF * unit / scales[:, None])[np.isfinite(scales)]
         dg.data *= unit[dg.indices] / np.repeat(nlp.g_scale, np.diff(dg.indptr))
         if not (np.isfinite(dF).all() and np.isfinite(dg.data).all() and np.isfinite(g).all()):

@@ -131,18 +131,21 @@ def origin(nlp: NLP) -> np.ndarray:
     return np.where(np.isfinite(nlp.lower), nlp.lower, 0.0)
 
 
-def scaled_bounds(nlp: NLP) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of y, (n,) each. Periodic variables get one more period on either side, so that a bound never stops them."""
-    start = origin(nlp)
-    return (nlp.lower - nlp.period - start) / nlp.scale, (nlp.upper + nlp.period - start) / nlp.scale
+def scaled_bounds(nlp: NLP, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of y, (n,) each. Periodic variables get one more period on either side, so that a bound never stops them; whole numbers keep
+    the values of the start (n,)."""
+    zero = origin(nlp)
+    lower, upper = (nlp.lower - nlp.period - zero) / nlp.scale, (nlp.upper + nlp.period - zero) / nlp.scale
+    lower[nlp.integers] = upper[nlp.integers] = ((start - zero) / nlp.scale)[nlp.integers]
+    return lower, upper
 
 
 def back_in_bounds(nlp: NLP, z: np.ndarray) -> np.ndarray:
-    """A vector (n,) within its bounds: periodic variables wrapped, the others clipped."""
+    """A vector (n,) within its bounds, periodic variables wrapped, the others clipped, and with whole numbers where they are meant."""
     out = np.flatnonzero((nlp.period > 0) & ((z < nlp.lower) | (z > nlp.upper)))
     z = z.copy()
     z[out] = nlp.lower[out] + np.mod(z[out] - nlp.lower[out], nlp.period[out])
-    return np.clip(z, nlp.lower, nlp.upper)
+    return nlp.rounded(np.clip(z, nlp.lower, nlp.upper))
 
 
 @remembered

@@ -180,7 +180,7 @@ def scalarize(
     held: Sequence[int] | np.ndarray = (),
 ) -> Solved:
     """Descend from a start (n,) to the front: least alpha with F - reference <= alpha weights (m,); ceiling (m,), margin (r,). The
-    variables `held` keep the start's values."""
+    variables `held`, and whole numbers, keep the start's values."""
     start = back_in_bounds(nlp, start)
     if stopping():
         return not_begun(nlp, start)
@@ -198,7 +198,7 @@ def scalarize(
     # for several objectives, from starts that are drawn, and where all but times is linear, so that optima lie in corners, iterations
     # without may take many times as long: 30 times on the skip entry, 100 times on a row of masses.
     scaled = task.limited or drawn or (feasible and several) or convex_objectives(nlp).all()
-    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled), np.array(held, dtype=int))
+    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled), np.union1d(held, nlp.integers).astype(int))
     found: list[Solved] = []
     for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
         left = max_iterations - sum(solved.iterations for solved in found)

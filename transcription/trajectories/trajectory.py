@@ -256,7 +256,7 @@ class Trajectory(Named[PhaseTrajectory]):
     """
 
     phases: tuple[PhaseTrajectory, ...]
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, float]  # whole numbers as ints
 
     def __repr__(self) -> str:
         phases = ", ".join(f"'{phase.name}' {phase.t0:g} to {phase.tf:g} {phase.time_unit}" for phase in self.phases)

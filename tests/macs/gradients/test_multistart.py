@@ -44,8 +44,8 @@ def after(losses: list[float | None]) -> MultistartStopping:
         ([1.0, 2.0] * 14, 1.0),
         ([1.0, *[2.0] * 34], 2.0),  # that of any other one counts half where the best was found once: 3 / (k (k - 1)) for k = 36
         ([None] * (MULTISTART.fewest - 1), None),
-        ([float(-k) for k in range(MULTISTART.most - 1)], -200.0),  # all better than those before
-        ([-100.0, *map(float, range(MULTISTART.many - 2))], -3.0),  # many, and nothing better since the first
+        ([float(-k) for k in range(MULTISTART.many[1] - 1)], -200.0),  # all better than those before
+        ([-100.0, *map(float, range(MULTISTART.many[0] - 2))], -3.0),  # many, and nothing better since the first
     ],
 )
 def test_when_starts_are_enough(losses, last):

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from macs import MACS
 from macs.decisions import ReferencePoint
 from macs.evaluation.bilevel import Bilevel
-from macs.evaluation.evaluator import CONVERGED, FAILED, Counts, Evaluation, Evaluator
+from macs.evaluation.evaluator import CONVERGED, FAILED, Counts, Evaluation, Evaluator, UnitBox
 from macs.gradients.polish import BudgetedSolves, Surface, cover, polish
 from macs.pareto.archive import Archive
 from macs.pareto.directions import across, simplex_lattice
@@ -309,6 +309,7 @@ class Answers:
     """Gives prepared objectives, and notes from where they were asked."""
 
     tolerance, counts = 1e-6, Counts()
+    free, box = np.arange(1), UnitBox(np.zeros(1), np.ones(1), np.zeros(1, dtype=bool))
 
     def __init__(self, *F: list[float]) -> None:
         self.F, self.starts = iter(np.array(F)), []
