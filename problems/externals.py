@@ -1,4 +1,5 @@
-"""Functions that CasADi cannot look into, such as a simulator written with NumPy or a table of another package, in a problem's expressions.
+"""Functions that CasADi cannot look into, such as a simulator written with NumPy, a table of another package or a compiled library, in a
+problem's expressions.
 
 In a graph, such a function is a call of `ExternalPoints`, its derivatives too: of one point in what users state, of all at once where it is
 evaluated (`layers.py`). First derivatives are complex steps (Squire and Trapp, SIAM Review 40(1), 1998) or central differences, of all
@@ -7,10 +8,13 @@ points in one call; second ones are differences of the first.
 
 from __future__ import annotations
 
+import ctypes
+import os
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -33,7 +37,7 @@ def reraise() -> None:
 
 
 def external(
-    function: Callable[..., Any],
+    function: Callable[..., Any] | str | os.PathLike[str],
     *,
     states: Sequence[Any] = (),
     controls: Sequence[Any] = (),
@@ -48,14 +52,17 @@ def external(
 
     Parameters
     ----------
-    function : callable
+    function : callable or path
         `function(states, controls, parameters, time)` takes arrays (batch, n), columns in the order of the names, and time (batch,), and
-        returns (batch, outputs), or (batch,) for one output. One that takes a single row works too, and is slow.
+        returns (batch, outputs), or (batch,) for one output. One that takes a single row works too, and is slow. Or `"model.so:rates"`: a
+        function of a compiled library with CasADi's C interface. Its inputs are the states, controls and parameters one after the other;
+        one that is called `t` or `time`, or the last one if it is one number too many, is time.
     states, controls, parameters : sequence of str or MX
         What the columns are: names of the phase's states and controls and of the problem's parameters, or expressions.
     derivatives : "complex", "finite" or callable
         Complex steps, which lose no digits; central differences; or a function of the same arguments that returns (batch, outputs, inputs),
-        time last or left out. Where complex steps turn out wrong, a warning says so and differences are used.
+        time last or left out. Where complex steps turn out wrong, a warning says so and differences are used. Of a library, the
+        derivatives that it exports, or differences.
     outputs : sequence of str or int, optional
         Names of what is returned, or how many there are; by default the states, else as many as a trial returns.
 
@@ -67,7 +74,8 @@ def external(
     Raises
     ------
     ValueError
-        Where names or derivatives make no sense; by `Problem.compile`, for another shape, no finite number or not always the same.
+        Where names or derivatives make no sense, or a library or its function is not there or takes other inputs; by `Problem.compile`,
+        for another shape, no finite number or not always the same.
 
     Examples
     --------
@@ -76,17 +84,22 @@ def external(
     (1, 1)
     """
     groups = {"states": states, "controls": controls, "parameters": parameters}
-    name = getattr(function, "__name__", type(function).__name__)
+    address = os.fspath(function) if isinstance(function, str | os.PathLike) else ""
+    name = os.path.basename(address) or getattr(function, "__name__", type(function).__name__)
     symbols = []
     for kind, group in groups.items():
         if isinstance(group, str | ca.MX):
             raise ValueError(f"external '{name}': {kind} must be a list, such as {kind}=['x'], not {group!r}")
         symbols.append([placeholder(kind, one) if isinstance(one, str) else ca.MX(one) for one in group])
+    inputs = [*(str(one) for group in groups.values() for one in group), "time"]
+    if address:
+        function = library(os.path.abspath(address), inputs)
     if not callable(function):
         raise ValueError(f"external: a function of (states, controls, parameters, time) is needed, not {function!r}")
     if derivatives not in ("complex", "finite") and not callable(derivatives):
         raise ValueError(f"external '{name}': derivatives must be 'complex', 'finite' or a function, not {derivatives!r}")
-    inputs = [*(str(one) for group in groups.values() for one in group), "time"]
+    if isinstance(function, Rows) and derivatives == "complex":
+        derivatives = function.jacobian if function.slopes is not None else "finite"
     made = External(function, name, inputs, [len(group) for group in symbols], derivatives)
     if outputs is None:
         outputs = made.tried(np.ones((13, len(inputs)))) or len(states)
@@ -123,6 +136,96 @@ def output_names(value: Any) -> list[str]:
     return points.external.outputs
 
 
+class Rows:
+    """A CasADi Function whose inside is not known, as a function of rows with derivatives of its own. Other processes load it by its path.
+
+    Parameters
+    ----------
+    name : str
+        For messages.
+    values : Function
+        (inputs) -> (outputs), time last.
+    slopes : Function, optional
+        (inputs) -> (outputs, inputs), derivatives.
+    again : tuple
+        How another process loads it: a function and its arguments.
+    depends : array (outputs, inputs) of bool, optional
+        False where an output does not depend on an input.
+    """
+
+    def __init__(
+        self, name: str, values: ca.Function, slopes: ca.Function | None, again: tuple[Any, ...], depends: np.ndarray | None = None
+    ) -> None:
+        self.__name__, self.values, self.slopes, self.again, self.depends = name, values, slopes, again, depends
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.again
+
+    def __call__(self, *parts: np.ndarray) -> np.ndarray:
+        return self._at(self.values, parts)
+
+    def jacobian(self, *parts: np.ndarray) -> np.ndarray:
+        """(batch, outputs, inputs)."""
+        assert self.slopes is not None
+        return self._at(self.slopes, parts).reshape(len(parts[0]), self.values.size1_in(0), -1).swapaxes(1, 2)
+
+    def _at(self, function: ca.Function, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """Its values, a row for each row; NaN where it fails."""
+        X = np.ascontiguousarray(np.column_stack(parts))
+        buffer, evaluate = _mapped(function, len(X))
+        found = np.empty((len(X), function.numel_out(0)))
+        buffer.set_arg(0, X.data)
+        buffer.set_res(0, found.data)
+        evaluate()
+        if not buffer.ret():
+            return found
+        return np.concatenate([self._at(function, [row[None]]) for row in X]) if len(X) > 1 else np.full_like(found, np.nan)
+
+
+@lru_cache(maxsize=256)
+def _mapped(function: ca.Function, count: int) -> tuple[Any, Callable[[], None]]:
+    """What calls a Function so many times."""
+    return function.map(count).buffer()
+
+
+def library(address: str, inputs: Sequence[str]) -> Rows:
+    """A function of a compiled library, "file:function", for inputs of these names, time last. Raises ValueError if it is not there or takes
+    other inputs."""
+    path, _, name = address.rpartition(":")
+    what = f"external '{os.path.basename(address)}'"
+    if not path or not name.isidentifier():
+        raise ValueError(f"{what}: the file of a library and its function are needed, such as 'model.so:rates'")
+    if not os.path.isfile(path):
+        raise ValueError(f"{what}: there is no file {path}")
+    try:
+        symbols = ctypes.CDLL(path)
+    except OSError as error:
+        raise ValueError(f"{what}: the library cannot be loaded: {error}") from None
+    if not hasattr(symbols, f"{name}_n_in"):  # without it, CasADi would call any C function of this name, with the wrong arguments
+        raise ValueError(f"{what}: the library has no function '{name}' of CasADi's C interface, with '{name}_n_in' beside it")
+    function = ca.external(name, path)
+    sizes, words = [function.nnz_in(i) for i in range(function.n_in())], function.name_in()
+    if sum(sizes) not in (len(inputs), len(inputs) - 1):
+        given = ", ".join(f"{word} ({size})" for word, size in zip(words, sizes, strict=True))
+        raise ValueError(
+            f"{what} takes {sum(sizes)} numbers, {given}; states, controls and parameters are {len(inputs) - 1}, {', '.join(inputs[:-1])}, "
+            "and time may be one more"
+        )
+    X = ca.MX.sym("X", len(inputs))
+    at = [i for i in range(len(sizes)) if words[i] in ("t", "time") and sizes[i] == 1] if sum(sizes) == len(inputs) else []
+    order = [i for i in range(len(sizes)) if i not in at[:1]] + at[:1]
+    starts = dict(zip(order, np.cumsum([0, *(sizes[i] for i in order)]), strict=False))
+    parts = [ca.MX(function.sparsity_in(i), X[int(starts[i]) : int(starts[i]) + sizes[i]]) for i in range(len(sizes))]
+    values = ca.densify(ca.veccat(*function.call(parts)))
+    slopes = depends = None
+    with suppress(RuntimeError):  # it exports no derivatives
+        jacobian = ca.jacobian(values, X)
+        slopes = ca.Function("slopes", [X], [ca.densify(jacobian)])
+        depends = np.array(ca.DM(jacobian.sparsity(), 1.0).full(), bool)
+    again = library, (address, list(inputs))
+    return Rows(os.path.basename(address), ca.Function("values", [X], [values]), slopes, again, depends)
+
+
 class External:
     """A function of rows, its derivatives, and what is known of both. Values and derivatives take and return arrays with a row a point."""
 
@@ -143,6 +246,12 @@ class External:
     def size(self) -> list[int]:
         """How many derivatives of each order there are at a point."""
         return [len(self.outputs) * len(self.inputs) ** order for order in range(3)]
+
+    @property
+    def known(self) -> np.ndarray:
+        """(outputs, inputs): False where an output does not depend on an input."""
+        own = self.function.depends if isinstance(self.function, Rows) else None
+        return np.ones((len(self.outputs), len(self.inputs)), bool) if own is None else own
 
     def points(self, order: int, count: int) -> ExternalPoints:
         """The Function of derivatives of an order at so many points."""
@@ -175,8 +284,9 @@ class External:
         k, n = X.shape
         if callable(self.derivatives):
             found = self._called(self.derivatives, X)
-            wide = found.ndim == 3 and found.shape[2] == n
-            return np.pad(self._shaped(found, (k, len(self.outputs), n - (not wide))), ((0, 0), (0, 0), (0, not wide))).swapaxes(1, 2)
+            if found.shape != (k, len(self.outputs), n):  # without time
+                found = np.pad(self._shaped(found, (k, len(self.outputs), n - 1)), ((0, 0), (0, 0), (0, 1)))
+            return found.swapaxes(1, 2)
         if self.derivatives == "complex":
             step = 1e-30
             found = self.values((X + 1j * step * np.eye(n)[:, None]).reshape(n * k, n)).imag / step
@@ -322,7 +432,8 @@ class ExternalPoints(ca.Callback):
     def get_jacobian(self, name: str, inputs: Any, outputs: Any, options: Any) -> ca.Function:
         X, W = ca.MX.sym("X", self.sparsity_in(0)), ca.MX.sym("W", self.sparsity_out(0))
         values = ca.vec(self.external.points(self.order + 1, self.count)(X))
-        return ca.Function(name, [X, W], [ca.MX(self._blocks, values)], inputs, outputs, options)
+        chosen = np.flatnonzero(np.tile(self._block.ravel(order="F"), self.count))
+        return ca.Function(name, [X, W], [ca.MX(self._blocks, values.nz[chosen.tolist()])], inputs, outputs, options)
 
     def has_jac_sparsity(self, output: int, of: int) -> bool:
         return True
@@ -331,7 +442,12 @@ class ExternalPoints(ca.Callback):
         return self._blocks
 
     @property
+    def _block(self) -> np.ndarray:
+        """Which derivatives of a point may differ from 0."""
+        known = self.external.known
+        return known if self.order == 0 else (known[:, :, None] & known[:, None]).reshape(-1, known.shape[1], order="F")
+
+    @property
     def _blocks(self) -> ca.Sparsity:
         """A block for each point."""
-        block = ca.DM.ones(self.external.size[self.order], len(self.external.inputs))
-        return ca.kron(ca.DM.eye(self.count), block).sparsity()
+        return ca.kron(ca.DM.eye(self.count), ca.sparsify(ca.DM(self._block.astype(float)))).sparsity()
