@@ -3,6 +3,7 @@
 from .catalogue import describe, is_catalogued, load, names
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
 from .externals import external
+from .models import Fmu, fmu
 from .phase import Phase
 from .problem import Problem
 from .vector import CompiledVectorProblem, VectorProblem
@@ -11,6 +12,7 @@ __all__ = [
     "CompiledPhase",
     "CompiledProblem",
     "CompiledVectorProblem",
+    "Fmu",
     "Limit",
     "Link",
     "Objective",
@@ -20,6 +22,7 @@ __all__ = [
     "VectorProblem",
     "describe",
     "external",
+    "fmu",
     "is_catalogued",
     "load",
     "names",

@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -84,8 +85,8 @@ def external(
     (1, 1)
     """
     groups = {"states": states, "controls": controls, "parameters": parameters}
-    address = os.fspath(function) if isinstance(function, str | os.PathLike) else ""
-    name = os.path.basename(address) or getattr(function, "__name__", type(function).__name__)
+    address = Path(function) if isinstance(function, str | os.PathLike) else None
+    name = address.name if address else getattr(function, "__name__", type(function).__name__)
     symbols = []
     for kind, group in groups.items():
         if isinstance(group, str | ca.MX):
@@ -93,7 +94,7 @@ def external(
         symbols.append([placeholder(kind, one) if isinstance(one, str) else ca.MX(one) for one in group])
     inputs = [*(str(one) for group in groups.values() for one in group), "time"]
     if address:
-        function = library(os.path.abspath(address), inputs)
+        function = library(address.absolute(), inputs)
     if not callable(function):
         raise ValueError(f"external: a function of (states, controls, parameters, time) is needed, not {function!r}")
     if derivatives not in ("complex", "finite") and not callable(derivatives):
@@ -137,20 +138,10 @@ def output_names(value: Any) -> list[str]:
 
 
 class Rows:
-    """A CasADi Function whose inside is not known, as a function of rows with derivatives of its own. Other processes load it by its path.
+    """A CasADi Function whose inside is not known, as a function of rows; other processes load it by its path.
 
-    Parameters
-    ----------
-    name : str
-        For messages.
-    values : Function
-        (inputs) -> (outputs), time last.
-    slopes : Function, optional
-        (inputs) -> (outputs, inputs), derivatives.
-    again : tuple
-        How another process loads it: a function and its arguments.
-    depends : array (outputs, inputs) of bool, optional
-        False where an output does not depend on an input.
+    `values` is (inputs) -> (outputs), time last, `slopes` their derivatives (outputs, inputs), or None. `again` is a function and its
+    arguments, which load it. `depends` (outputs, inputs) is False where an output does not depend on an input.
     """
 
     def __init__(
@@ -188,14 +179,14 @@ def _mapped(function: ca.Function, count: int) -> tuple[Any, Callable[[], None]]
     return function.map(count).buffer()
 
 
-def library(address: str, inputs: Sequence[str]) -> Rows:
-    """A function of a compiled library, "file:function", for inputs of these names, time last. Raises ValueError if it is not there or takes
-    other inputs."""
-    path, _, name = address.rpartition(":")
-    what = f"external '{os.path.basename(address)}'"
+def library(address: Path, inputs: Sequence[str]) -> Rows:
+    """A function of a compiled library, "file:function", for inputs of these names, time last. Raises ValueError if it is not there or
+    takes other inputs."""
+    path, _, name = str(address).rpartition(":")
+    what = f"external '{address.name}'"
     if not path or not name.isidentifier():
         raise ValueError(f"{what}: the file of a library and its function are needed, such as 'model.so:rates'")
-    if not os.path.isfile(path):
+    if not Path(path).is_file():
         raise ValueError(f"{what}: there is no file {path}")
     try:
         symbols = ctypes.CDLL(path)
@@ -223,7 +214,7 @@ def library(address: str, inputs: Sequence[str]) -> Rows:
         slopes = ca.Function("slopes", [X], [ca.densify(jacobian)])
         depends = np.array(ca.DM(jacobian.sparsity(), 1.0).full(), bool)
     again = library, (address, list(inputs))
-    return Rows(os.path.basename(address), ca.Function("values", [X], [values]), slopes, again, depends)
+    return Rows(address.name, ca.Function("values", [X], [values]), slopes, again, depends)
 
 
 class External:
@@ -370,13 +361,16 @@ class External:
             return
         _, i, j = np.argwhere(wrong)[0]
         what = f"the derivative of '{self.outputs[j]}' by '{self.inputs[i]}'"
-        if given != "complex":
-            k = np.flatnonzero(wrong[:, i, j])[0]
-            raise ValueError(f"external '{self.name}': {what} is {exact[k, i, j]:g} as given, and {differences[k, i, j]:g} by differences")
+        k = np.flatnonzero(wrong[:, i, j])[0]
+        both = f"{exact[k, i, j]:g} as given, and {differences[k, i, j]:g} by differences"
+        if given != "complex" and not (isinstance(self.function, Rows) and self.function.depends is None):
+            raise ValueError(f"external '{self.name}': {what} is {both}")
         self.derivatives = "finite"
         self._warn(
             f"{what} is wrong by complex steps, as by np.abs, float() or tables for real numbers: differences are used, as by "
             "derivatives='finite'; or give derivatives=jacobian"
+            if given == "complex"
+            else f"{what} is {both}, which are used"
         )
 
     def _warn(self, message: str) -> None:
