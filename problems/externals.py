@@ -99,7 +99,7 @@ def external(
         raise ValueError(f"external: a function of (states, controls, parameters, time) is needed, not {function!r}")
     if derivatives not in ("complex", "finite") and not callable(derivatives):
         raise ValueError(f"external '{name}': derivatives must be 'complex', 'finite' or a function, not {derivatives!r}")
-    if isinstance(function, Rows) and derivatives == "complex":
+    if isinstance(function, Native) and derivatives == "complex":
         derivatives = function.jacobian if function.slopes is not None else "finite"
     made = External(function, name, inputs, [len(group) for group in symbols], derivatives)
     if outputs is None:
@@ -137,7 +137,7 @@ def output_names(value: Any) -> list[str]:
     return points.external.outputs
 
 
-class Rows:
+class Native:
     """A CasADi Function whose inside is not known, as a function of rows; other processes load it by its path.
 
     `values` is (inputs) -> (outputs), time last, `slopes` their derivatives (outputs, inputs), or None. `again` is a function and its
@@ -179,7 +179,7 @@ def _mapped(function: ca.Function, count: int) -> tuple[Any, Callable[[], None]]
     return function.map(count).buffer()
 
 
-def library(address: Path, inputs: Sequence[str]) -> Rows:
+def library(address: Path, inputs: Sequence[str]) -> Native:
     """A function of a compiled library, "file:function", for inputs of these names, time last. Raises ValueError if it is not there or
     takes other inputs."""
     path, _, name = str(address).rpartition(":")
@@ -214,7 +214,7 @@ def library(address: Path, inputs: Sequence[str]) -> Rows:
         slopes = ca.Function("slopes", [X], [ca.densify(jacobian)])
         depends = np.array(ca.DM(jacobian.sparsity(), 1.0).full(), bool)
     again = library, (address, list(inputs))
-    return Rows(address.name, ca.Function("values", [X], [values]), slopes, again, depends)
+    return Native(address.name, ca.Function("values", [X], [values]), slopes, again, depends)
 
 
 class External:
@@ -241,7 +241,7 @@ class External:
     @property
     def known(self) -> np.ndarray:
         """(outputs, inputs): False where an output does not depend on an input."""
-        own = self.function.depends if isinstance(self.function, Rows) else None
+        own = self.function.depends if isinstance(self.function, Native) else None
         return np.ones((len(self.outputs), len(self.inputs)), bool) if own is None else own
 
     def points(self, order: int, count: int) -> ExternalPoints:
@@ -363,7 +363,7 @@ class External:
         what = f"the derivative of '{self.outputs[j]}' by '{self.inputs[i]}'"
         k = np.flatnonzero(wrong[:, i, j])[0]
         both = f"{exact[k, i, j]:g} as given, and {differences[k, i, j]:g} by differences"
-        if given != "complex" and not (isinstance(self.function, Rows) and self.function.depends is None):
+        if given != "complex" and not (isinstance(self.function, Native) and self.function.depends is None):
             raise ValueError(f"external '{self.name}': {what} is {both}")
         self.derivatives = "finite"
         self._warn(

@@ -22,7 +22,7 @@ from typing import Any
 
 import casadi as ca
 
-from .externals import Rows, external
+from .externals import Native, external
 from .phase import Phase
 
 
@@ -251,7 +251,7 @@ def _reason(error: Exception) -> str:
 
 
 @lru_cache(maxsize=8)
-def _rows(path: Path, stamp: int, columns: tuple[str, ...], constants: tuple[tuple[str, float], ...], outputs: tuple[str, ...]) -> Rows:
+def _rows(path: Path, stamp: int, columns: tuple[str, ...], constants: tuple[tuple[str, float], ...], outputs: tuple[str, ...]) -> Native:
     """Rates and outputs of an FMU, as a function of columns, and of time."""
     name, dae = path.name, _loaded(path, stamp)
     for one in [*dae.p(), *dae.u()]:
@@ -282,7 +282,7 @@ def _rows(path: Path, stamp: int, columns: tuple[str, ...], constants: tuple[tup
         by_time = (value(X, time + step) - value(X, time - step)) / (2.0 * step)
         slope = ca.Function("slope", [X, time], [ca.densify(ca.horzcat(ca.vertcat(*found), by_time))])
         slopes = ca.Function("slopes", [X], [slope(X, X[n])])
-    return Rows(name, ca.Function("values", [X], [value(X, X[n])]), slopes, (_rows, (path, stamp, columns, constants, outputs)))
+    return Native(name, ca.Function("values", [X], [value(X, X[n])]), slopes, (_rows, (path, stamp, columns, constants, outputs)))
 
 
 def _attributes(root: ElementTree.Element) -> dict[str, dict[str, str]]:
