@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from problems.compiled import CompiledProblem, Objective, remembered
+from problems.compiled import CompiledProblem, Objective
 from problems.problem import Problem
 from transcription import from_dict
 from transcription.nlp.optimality import ratio_bounds, ratio_residual
@@ -27,7 +27,7 @@ from ..fronts.point import Point
 from ..fronts.points import Points
 from ..io.text import text_table
 from ..preferences.ranges import sense_and_unit
-from ..refinement.mesh_loop import Programs
+from ..refinement.mesh_loop import latest_programs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -321,7 +321,7 @@ class TradeOffs:
             problem = self.problem or point.compiled()
         except ValueError as reason:
             raise ValueError(f"the gradients at point {point.index} need its problem, and {reason}") from None
-        nlp = _programs(problem)(from_dict(point.transcription))
+        nlp = latest_programs(problem)(from_dict(point.transcription))
         found = projection(nlp, point.decision, point.ranges) if len(nlp.variables) == len(point.decision) else None
         if found is None:
             raise ValueError(f"the gradients of the objectives at point {point.index} are no numbers, or have no multipliers")
@@ -399,12 +399,6 @@ def plot_rates(front: Points, figure: object = None) -> Sequence[Axes]:
     from .figures import draw_rates
 
     return draw_rates(front, front_rates(front), figure)
-
-
-@remembered
-def _programs(problem: CompiledProblem) -> Programs:
-    """The NLPs of the latest points: those on meshes of their own have one each."""
-    return Programs(problem)
 
 
 def _signed(value: float) -> str:

@@ -103,7 +103,7 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
 def _weighted_gain(nlp: NLP, z: np.ndarray, found: Multipliers) -> float | None:
     """What other controls would gain in the weighted sum of the objectives, see `gains`; None where there are no costates to tell."""
     quantities = [np.array(q).ravel() for q in nlp.quantities.call([z])]
-    phases = gains(nlp.problem, nlp.unpack(z), OptimumMultipliers.at(nlp, z, found), quantities, np.ones(len(nlp.problem.goals)))
+    phases = gains(nlp.problem, nlp.unpack(z), OptimumMultipliers.of(nlp, z, found), quantities, np.ones(len(nlp.problem.goals)))
     return sum(float(gain.amounts.sum()) for gain in phases.values()) if phases else None
 
 

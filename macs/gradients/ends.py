@@ -151,7 +151,7 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
     with solver.solves.at_most(END.ties):
         for k, solved in enumerate(found):
             if solved.status == CONVERGED and solved.multipliers is not None:
-                weights, tolerance = solved.multipliers[: len(ranges)], solver.solves.tolerance
+                weights, tolerance = solved.multipliers.of_objectives, solver.solves.tolerance
                 found[k] = strongly_optimal(solver.from_vector, tolerance, solved, weights, ranges)
                 solver.solves.counts.keep(found[k] is not solved)
     return found

@@ -11,6 +11,7 @@ import numpy as np
 
 from transcription.base import NLP
 from transcription.nlp.elastic import least_violation
+from transcription.nlp.optimality import Multipliers
 from transcription.nlp.scalarized import Solved, not_begun, scalarize
 from transcription.stopping import stopping
 
@@ -23,17 +24,25 @@ class Scalarised:
     """From a reference along weights to the front (Pascoletti and Serafini 1984); see `scalarize`.
 
     minimise alpha   subject to   F_i - reference_i <= alpha weights_i,   F_i <= ceiling_i
+
+    If they are `summed`, alpha is the sum of weights_i (F_i - reference_i) instead.
     """
 
     reference: np.ndarray  # (m,): infinite for an objective that is left out
     weights: np.ndarray  # (m,): 0 where the reference is a hard limit
     ceiling: np.ndarray | None = None  # (m,)
     units: np.ndarray = field(default_factory=lambda: np.ones(1))  # (m,): what counts as one in each objective; default: 1
+    summed: bool = False
 
     @classmethod
     def single(cls, i: int, m: int, ceiling: np.ndarray | None = None) -> Scalarised:
         """Objective i of m alone."""
         return cls(np.where(np.arange(m) == i, 0.0, np.inf), np.eye(m)[i], ceiling)
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """It as arguments of `scalarize`."""
+        return {"reference": self.reference, "weights": self.weights, "ceiling": self.ceiling, "summed": self.summed}
 
     @property
     def used(self) -> np.ndarray:
@@ -53,18 +62,19 @@ class Scalarised:
     @property
     def hard(self) -> np.ndarray:
         """Mask (m,) of the objectives with a hard limit."""
-        return (self.reference < np.inf) & (self.weights <= 0)
+        return (self.reference < np.inf) & (self.weights <= 0) & ~np.bool_(self.summed)
 
     def alpha(self, F: np.ndarray) -> Any:
         """The minimised alpha, at objectives (..., m)."""
         moving = self.moving
-        return np.max((F[..., moving] - self.reference[moving]) / self.weights[moving], axis=-1, initial=-np.inf)
+        above = F[..., moving] - self.reference[moving]
+        return above @ self.weights[moving] if self.summed else np.max(above / self.weights[moving], axis=-1, initial=-np.inf)
 
     def loss(self, F: np.ndarray) -> float:
         """Alpha and the excess over hard limits at objectives (m,), in units."""
         units = np.broadcast_to(self.units, self.weights.shape)
         moving, hard = self.moving, self.hard
-        alpha = self.alpha(F) * np.max((self.weights / units)[moving])
+        alpha = self.alpha(F) * (1.0 if self.summed else np.max((self.weights / units)[moving]))
         return float(alpha + np.maximum((F - self.reference)[hard] / units[hard], 0.0).sum())
 
     def rank(self, solved: Solved) -> tuple[bool, float]:
@@ -76,9 +86,9 @@ class Scalarised:
         """Alpha at a result; None if that did not converge."""
         return float(self.alpha(solved.F)) if solved.status == CONVERGED else None
 
-    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
-        """The result of gradient solves from a vector (n,), or near it only."""
-        return solves(nlp, start, self, near)
+    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False, warm: Multipliers | None = None) -> Solved:
+        """The result of gradient solves from a vector (n,), or near it only, there with multipliers to begin with."""
+        return solves(nlp, start, self, near, warm=warm)
 
 
 @dataclass(frozen=True)
@@ -125,7 +135,7 @@ def without_loss(
     explained = float(np.max(slack[task.moving] / task.weights[task.moving]))
     if best.multipliers is not None:
         # They are slopes; the root of a slack is twice that.
-        worth = best.multipliers[: len(slack)]
+        worth = best.multipliers.of_objectives
         rate = float(worth[limited] @ slack[limited]) / float(worth[task.moving] @ task.weights[task.moving])
         explained = max(explained, 2 * (1 + END.unsure) * rate)
     gain = task.alpha(end.F) - task.alpha(best.F)
@@ -168,7 +178,7 @@ class LexicographicEnd(Scalarised):
     @classmethod
     def of(cls, i: int, units: np.ndarray, known: np.ndarray) -> LexicographicEnd:
         """That of objective i. units, known (m,)."""
-        return cls(np.where(np.arange(len(units)) == i, 0.0, np.inf), units, None, units, known)
+        return cls(np.where(np.arange(len(units)) == i, 0.0, np.inf), units, None, units, known=known)
 
     @property
     def used(self) -> np.ndarray:
@@ -180,7 +190,7 @@ class LexicographicEnd(Scalarised):
         """See `Scalarised.sharp`: where the front is steep, the others are determined by the root of an error of the first."""
         return self.moving
 
-    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False) -> Solved:
+    def solve(self, solves: GradientSolves, nlp: NLP, start: np.ndarray, near: bool = False, warm: Multipliers | None = None) -> Solved:
         """See `Scalarised.solve`."""
         mine, units = self.moving, self.weights
         alone = Scalarised(self.reference, units)
@@ -240,9 +250,9 @@ class GradientSolves:
         self.counts, self._persistent, self._most_work = Counts(), True, np.inf
         self.before: Callable[[], None] = lambda: None
 
-    def __call__(self, nlp: NLP, start: np.ndarray, task: Scalarised, near: bool = False, held: Sequence[int] | np.ndarray = ()) -> Solved:
-        """The result of one solve from a vector (n,), or near it only, where some variables keep their values; see `scalarize`."""
-        return self.each(nlp, [(start, task)], near, held)[0]
+    def __call__(self, nlp: NLP, start: np.ndarray, task: Scalarised, near: bool = False, warm: Multipliers | None = None) -> Solved:
+        """The result of one solve from a vector (n,), or near it only, with multipliers to begin with; see `scalarize`."""
+        return self.each(nlp, [(start, task)], near, warm=warm)[0]
 
     def each(
         self,
@@ -250,16 +260,18 @@ class GradientSolves:
         begun: Sequence[tuple[np.ndarray, Scalarised]],
         near: bool = False,
         held: Sequence[int] | np.ndarray = (),
+        warm: Multipliers | None = None,
     ) -> list[Solved]:
-        """The results of independent solves, each from a vector (n,), side by side where there are processes (`io.workers`)."""
+        """The results of independent solves, each from a vector (n,), side by side where there are processes (`io.workers`); some variables
+        are `held`."""
         self.before()
         if self._most_work <= self.counts.work:
             return [replace(not_begun(nlp, start), status=FAILED, clocked=False) for start, _ in begun]
         iterations = max(1, int(min(self.max_iterations, (self._most_work - self.counts.work) / len(nlp.variables))))
         persistent = self._persistent and iterations == self.max_iterations
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": iterations, "persistent": persistent}
-        settings = {"near": near, "held": held, **limits}
-        pieces = [(one, {"reference": task.reference, "weights": task.weights, "ceiling": task.ceiling, **settings}) for one, task in begun]
+        settings = {"near": near, "held": held, "warm": warm, **limits}
+        pieces = [(one, task.stated | settings) for one, task in begun]
         return [self._counted(nlp, solved) for solved in each(scalarized, nlp, pieces)]
 
     def least_violation(self, nlp: NLP, start: np.ndarray) -> Solved:
@@ -293,18 +305,19 @@ class GradientSolves:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A vector z (n,) at which a solve begins, whether the solve stays near it, and the loss that its result may have."""
+    """A vector z (n,) at which a solve begins, whether the solve stays near it, the loss that its result may have, and its multipliers."""
 
     z: np.ndarray
     near: bool = False
     drift: float = 0.0
+    warm: Multipliers | None = None
 
 
 def best_of(task: Scalarised, solves: GradientSolves, nlp: NLP, starts: Iterable[Start], bound: float = -np.inf) -> Solved:
     """The best result of solves from starts in turn, until one loses no more than its start may, compared with a bound."""
     best: Solved | None = None
     for start in starts:
-        solved = task.solve(solves, nlp, start.z, start.near)
+        solved = task.solve(solves, nlp, start.z, start.near, start.warm)
         if best is None or task.rank(solved) < task.rank(best):
             best = solved
         if stopping() or (best.status == CONVERGED and task.loss(best.F) <= bound + start.drift):

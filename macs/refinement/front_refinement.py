@@ -113,7 +113,7 @@ class PointToRefine:
         # What gains already is to be seen where it begins.
         conditions = Conditions.of(nlp, z, task.units) if self.gaining else None
         multipliers = None if conditions is None else conditions.multipliers()
-        optimum = None if multipliers is None else OptimumMultipliers.at(nlp, z, multipliers)
+        optimum = None if multipliers is None else OptimumMultipliers.of(nlp, z, multipliers)
         begun = loop.on_mesh(self.method, z, self.F, self.trajectory, task.units, self.optimal, optimum)
         hints = self.far if begun.verdict.error > FRONT.hinted else self.hints
         # Rough controls would need finer meshes than optimal ones.

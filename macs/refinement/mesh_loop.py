@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from problems.compiled import CompiledProblem
+from problems.compiled import CompiledProblem, remembered
 from problems.sampling import objective_sizes, refuse_peaks
 from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
@@ -88,6 +88,12 @@ class Programs:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Programs, (self.problem, self._kept)
+
+
+@remembered
+def latest_programs(problem: CompiledProblem) -> Programs:
+    """The NLPs of the points of a front that were looked at last: those on meshes of their own have one each."""
+    return Programs(problem, 2 * LOOP.kept)
 
 
 @dataclass(frozen=True, eq=False)

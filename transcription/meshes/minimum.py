@@ -38,15 +38,10 @@ class OptimumMultipliers:
     of_constraints: np.ndarray
 
     @classmethod
-    def of(cls, nlp: NLP, z: np.ndarray, multipliers: np.ndarray) -> OptimumMultipliers:
-        """From the multipliers (m + r,) of the objectives and rows of an NLP at its optimum z (n,)."""
-        m, constraints = len(nlp.problem.goals), len(nlp.problem.limits)
-        return cls(nlp.costates(z, multipliers[m:]), multipliers[:m], multipliers[len(multipliers) - constraints :])
-
-    @classmethod
-    def at(cls, nlp: NLP, z: np.ndarray, found: Multipliers) -> OptimumMultipliers:
-        """From the multipliers that the conditions of optimality at z (n,) have."""
-        return cls.of(nlp, z, np.concatenate([found.of_objectives, found.of_rows]))
+    def of(cls, nlp: NLP, z: np.ndarray, found: Multipliers) -> OptimumMultipliers:
+        """From the multipliers of an NLP at its optimum z (n,)."""
+        constraints = len(nlp.problem.limits)
+        return cls(nlp.costates(z, found.of_rows), found.of_objectives, found.of_rows[len(found.of_rows) - constraints :])
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from ..base import CONVERGED, FAILED, INFEASIBLE, NLP
 from ..phases.writer import DYNAMICS
 from ..stopping import Stopped, check_stopping, stopping
 from .derivatives import gradients, hessian
+from .optimality import Multipliers
 from .program import Watched, back_in_bounds, derivatives_of_program, ipopt_options, multiplied, origin, scaled_bounds
 from .scalarized import SOLVE, Solved, ended, not_begun
 
@@ -56,7 +57,8 @@ def least_violation(nlp: NLP, start: np.ndarray, *, tolerance: float = 1e-6, max
     elif done:
         solved = replace(solved, status=INFEASIBLE, message="the violation can get no smaller nearby")
     # Of the sum of what rows miss, in their weights.
-    return replace(solved, multipliers=np.concatenate([0.0 * solved.F, np.array(answer["lam_g"]).ravel() * weights / nlp.g_scale]))
+    of_rows, none = np.array(answer["lam_g"]).ravel() * weights / nlp.g_scale, np.zeros(len(start))
+    return replace(solved, multipliers=Multipliers(0.0 * solved.F, of_rows, none))
 
 
 def opposing(nlp: NLP, z: np.ndarray) -> tuple[str, ...]:
@@ -67,7 +69,7 @@ def opposing(nlp: NLP, z: np.ndarray) -> tuple[str, ...]:
     solved, found = least_violation(nlp, z), dict[str, float]()
     if solved.status != INFEASIBLE or solved.multipliers is None:
         return ()
-    missed, strengths = nlp.violations(solved.z), np.abs(solved.multipliers[len(solved.F) :]) * nlp.g_scale
+    missed, strengths = nlp.violations(solved.z), np.abs(solved.multipliers.of_rows) * nlp.g_scale
     for label, strength in zip(nlp.g_labels, strengths.tolist(), strict=True):
         if not label.startswith(DYNAMICS) and missed[label] <= 1e-6:
             found[label] = found.get(label, 0.0) + strength

@@ -192,12 +192,13 @@ def program_parameters(shift: np.ndarray, inverse: np.ndarray, slope: np.ndarray
 
 
 @remembered
-def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> Watched:
+def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options, summed: bool = False) -> Watched:
     """The solver of the program
 
         minimise a   subject to   (F(z) - shift) / scale <= slope a,   (F(z) - shift) / scale <= top,   rows and bounds,
 
     in x = (y, a) with z = origin + scales y. Its rows are those of the NLP in their scales, then the objectives moving, then at rest.
+    `summed`: what moves is one row, the sum of slope (F(z) - shift) / scale <= a.
     """
     refuse_peaks(nlp.problem)
     n, m, r = len(nlp.variables), len(nlp.problem.goals), len(nlp.g_scale)
@@ -206,13 +207,15 @@ def solver(nlp: NLP, seconds: float, max_iterations: int, options: Options) -> W
     z = origin(nlp) + x[:n] * scales
     F, g = nlp.functions(z)
     above = (F - shift) * inverse
-    values = ca.vertcat(g * rows, above - x[n] * slope, above)
+    values = ca.vertcat(g * rows, ca.dot(slope, above) - x[n] if summed else above - x[n] * slope, above)
     dF, dg, _, _ = gradients(nlp)(z)
     check_stopping()
     of_rows, of_objectives = multiplied(dg, rows, scales), multiplied(dF, inverse, scales)
-    jacobian = ca.blockcat([[of_rows, ca.MX(r, 1)], [of_objectives, -slope], [of_objectives, ca.MX(m, 1)]])
-    lam_g = ca.MX.sym("lam_g", r + 2 * m)
-    of_g, moving, resting = ca.vertsplit(lam_g, [0, r, r + m, r + 2 * m])
+    moving_rows = [slope.T @ of_objectives, ca.MX(-1.0)] if summed else [of_objectives, -slope]
+    jacobian = ca.blockcat([[of_rows, ca.MX(r, 1)], moving_rows, [of_objectives, ca.MX(m, 1)]])
+    lam_g = ca.MX.sym("lam_g", values.numel())
+    of_g, moving, resting = ca.vertsplit(lam_g, [0, r, values.numel() - m, values.numel()])
+    moving = moving * slope if summed else moving
     # The program's own objective is linear.
     curvature = multiplied(hessian(nlp)(z, (moving + resting) * inverse, of_g * rows), scales, scales)
     derivatives = derivatives_of_program(x, p, (values, jacobian), lam_g, ca.diagcat(curvature, ca.MX(1, 1)))

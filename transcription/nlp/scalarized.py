@@ -18,7 +18,7 @@ import numpy as np
 from ..base import CONVERGED, FAILED, INFEASIBLE, NLP, TIMEOUT
 from ..stopping import Stopped, stopping
 from .derivatives import convex_objectives
-from .optimality import optimality
+from .optimality import Multipliers, optimality
 from .program import (
     STATUS_OF_IPOPT,
     Options,
@@ -72,6 +72,8 @@ class _Strategy:
     equilibrated: bool = True  # whether variables and rows are
 
 
+WARMED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
+"""What IPOPT would move away from limits before a warm start."""
 COMMON: Options = (
     ("tol", SOLVE.accuracy),
     ("acceptable_tol", 100 * SOLVE.accuracy),
@@ -93,6 +95,16 @@ NEAR = _Strategy(
 """Stays in the basin of a feasible start."""
 INSIDE = _Strategy(NEAR.options, share=0.3)
 """From the optimum of almost the same: little has to change."""
+WARM = _Strategy(
+    (
+        ("warm_start_init_point", "yes"),
+        ("mu_strategy", "adaptive"),
+        ("mu_init", 1e-8),
+        *((f"warm_start_{what}", SOLVE.accuracy) for what in WARMED),
+    ),
+    share=0.2,
+)
+"""From a vector with its multipliers: both are nearly those of the optimum."""
 UNSCALED = _Strategy((("mu_strategy", "adaptive"),), share=0.3, equilibrated=False)
 """In the scales of the problem, where the derivatives at the start say little about those at the optimum."""
 MONOTONE = _Strategy((("mu_init", 0.1),), share=0.46)
@@ -112,9 +124,7 @@ class Solved:
     begun: bool = True  # false if there was no solve: the work was to end before
     # Why the solve ended where it did not converge by itself, never empty then: the limit that was reached, or what IPOPT says.
     message: str = ""
-    # (m + r,): Of the objectives, not negative, and of the rows of the NLP: with those of the bounds, the derivatives of the weighted sum
-    # of both vanish. None where nothing was solved.
-    multipliers: np.ndarray | None = None
+    multipliers: Multipliers | None = None  # None where nothing was solved
 
     def __repr__(self) -> str:
         return f"Solved({self.status}, F={self.F}, violation={self.violation:.1e}, iterations={self.iterations})"
@@ -129,6 +139,7 @@ class _Settings:
     seconds: float
     scaled: bool  # whether MUMPS scales its matrices
     held: np.ndarray  # which variables keep their values
+    warm: Multipliers | None  # to begin with
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +147,7 @@ class _Task:
     """One scalarisation in numbers near one.
 
     Row i is (F_i - shift_i) / scale_i <= slope_i a, with a = 0 at the start; (F_i - shift_i) / scale_i <= top_i is its hard limit. The rows
-    of the NLP are between lower and upper.
+    of the NLP are between lower and upper. If they are `summed`, one row is the sum of slope_i (F_i - shift_i) / scale_i <= a instead.
     """
 
     shift: np.ndarray
@@ -146,22 +157,28 @@ class _Task:
     top: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
+    summed: bool
 
     @property
     def limited(self) -> bool:
         """Whether objectives have hard limits."""
-        return bool(np.isfinite(self.top).any() or (self.used & (self.slope == 0)).any())
+        return bool(np.isfinite(self.top).any() or self.hard.any())
+
+    @property
+    def hard(self) -> np.ndarray:
+        """Mask (m,) of the objectives with one, at a = 0."""
+        return self.used & (self.slope == 0) & ~self.summed
 
     def value(self, F: np.ndarray) -> float:
         """The least a that F (m,) allows."""
         moving = self.slope > 0
-        return float(np.max((F - self.shift)[moving] / (self.scale * self.slope)[moving]))
+        above = (F - self.shift)[moving] / self.scale[moving]
+        return float(above @ self.slope[moving] if self.summed else np.max(above / self.slope[moving]))
 
     def excess(self, F: np.ndarray) -> float:
         """The amount by which F (m,) exceeds hard limits, in scales."""
         over = (F - self.shift) / self.scale
-        hard = self.used & (self.slope == 0)
-        return float(np.fmax(over - self.top, np.where(hard, over, -np.inf)).max(initial=0.0))
+        return float(np.fmax(over - self.top, np.where(self.hard, over, -np.inf)).max(initial=0.0))
 
 
 def scalarize(
@@ -178,14 +195,17 @@ def scalarize(
     persistent: bool = True,
     near: bool = False,
     held: Sequence[int] | np.ndarray = (),
+    summed: bool = False,
+    warm: Multipliers | None = None,
 ) -> Solved:
     """Descend from a start (n,) to the front: least alpha with F - reference <= alpha weights (m,); ceiling (m,), margin (r,). The
-    variables `held`, and whole numbers, keep the start's values."""
+    variables `held`, and whole numbers, keep the start's values. `summed`: the least weighted sum of the objectives instead. `warm`:
+    multipliers that are nearly those of the result."""
     start = back_in_bounds(nlp, start)
     if stopping():
         return not_begun(nlp, start)
     try:
-        task = _task(nlp, start, reference, weights, ceiling, margin)
+        task = _task(nlp, start, reference, weights, ceiling, margin, summed)
     except Stopped:  # while derivatives were built
         return not_begun(nlp, start)
     if not np.isfinite(start).all():  # a peak of what is infinite there; IPOPT would not begin
@@ -198,9 +218,11 @@ def scalarize(
     # for several objectives, from starts that are drawn, and where all but times is linear, so that optima lie in corners, iterations
     # without may take many times as long: 30 times on the skip entry, 100 times on a row of masses.
     scaled = task.limited or drawn or (feasible and several) or convex_objectives(nlp).all()
-    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled), np.union1d(held, nlp.integers).astype(int))
+    kept = np.union1d(held, nlp.integers).astype(int)
+    settings = _Settings(float(tolerance), int(max_iterations), float(seconds), bool(scaled), kept, warm)
     found: list[Solved] = []
-    for strategy in (INSIDE,) if near else _strategies(feasible, margin is not None):
+    nearby = (INSIDE,) if warm is None else (WARM, INSIDE)
+    for strategy in nearby if near else _strategies(feasible, margin is not None):
         left = max_iterations - sum(solved.iterations for solved in found)
         least = min(SOLVE.least_iterations, max_iterations)
         share = max(least, int(strategy.share * max_iterations)) if found or persistent else max_iterations
@@ -245,7 +267,13 @@ def not_begun(nlp: NLP, start: np.ndarray) -> Solved:
 
 
 def _task(
-    nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, ceiling: np.ndarray | None, margin: np.ndarray | None
+    nlp: NLP,
+    start: np.ndarray,
+    reference: np.ndarray,
+    weights: np.ndarray,
+    ceiling: np.ndarray | None,
+    margin: np.ndarray | None,
+    summed: bool,
 ) -> _Task:
     limits = np.full(len(reference), np.inf) if ceiling is None else ceiling
     inside = np.zeros(len(nlp.g_scale)) if margin is None else margin
@@ -255,15 +283,15 @@ def _task(
     F = np.where(np.isfinite(F), F, np.where(used, reference, 0.0))
     # alpha is measured from the start's, in the scales of the objectives: digits are kept wherever the reference is.
     alpha = np.max((F[moving] - reference[moving]) / weights[moving])
-    shift = np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
+    shift = F if summed else np.where(used, np.where(used, reference, 0.0) + alpha * weights, F)
     scale = nlp_scales(nlp)
     if (scale > SOLVE.absurd).any():
         own = _own_scales(nlp, start, F)
         scale = np.where(scale > SOLVE.absurd * np.maximum(own, 1.0), own, scale)
-    slope = np.where(moving, weights, 0.0) / scale
+    slope = np.where(moving, weights, 0.0) * (scale if summed else 1.0 / scale)
     lower, upper = nlp.g_lower / nlp.g_scale, nlp.g_upper / nlp.g_scale
     inside = np.minimum(inside, 0.5 * (upper - lower))
-    return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale, lower + inside, upper - inside)
+    return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale, lower + inside, upper - inside, summed)
 
 
 def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> Solved:
@@ -286,7 +314,7 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     options = (*COMMON, ("mumps_scaling", 77 if settings.scaled else 0), ("constr_viol_tol", min(1e-8, 0.1 * tolerance)), *strategy.options)
     try:
         columns, rows = equilibrated(nlp, start) if strategy.equilibrated else (nlp.scale, nlp.g_scale)
-        run = solver(nlp, settings.seconds, settings.max_iterations, options)
+        run = solver(nlp, settings.seconds, settings.max_iterations, options, task.summed)
     except Stopped:
         return not_begun(nlp, start), False
     lower, upper, made_up = _box(nlp, start, strategy.radius)
@@ -295,15 +323,18 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
     states = np.where(made_up, 0.0, slack * nlp.scale)
     states[:, nlp.free] = 0.0
     ways = np.where(nlp.g_lower < nlp.g_upper, slack, 0.0)
-    none, zero = np.full(2 * len(task.used), -np.inf), origin(nlp)
+    used = np.ones(1, dtype=bool) if task.summed else task.used
+    none, zero = np.full(len(used) + len(task.top), -np.inf), origin(nlp)
     to_rows = nlp.g_scale / rows
+    begun = {} if strategy is not WARM or settings.warm is None else _multipliers(task, settings.warm, columns, rows)
     answer = run(
         x0=np.append((np.clip(start, lower, upper) - zero) / columns, 0.0),
         p=program_parameters(task.shift, 1.0 / task.scale, task.slope, columns, rows),
         lbx=np.append((lower - states[0] - zero) / columns, -np.inf),
         ubx=np.append((upper + states[1] - zero) / columns, 0.0 if strategy.held else np.inf),
         lbg=np.concatenate([(task.lower - ways) * to_rows, none]),
-        ubg=np.concatenate([(task.upper + ways) * to_rows, np.where(task.used, 0.0, np.inf), task.top]),
+        ubg=np.concatenate([(task.upper + ways) * to_rows, np.where(used, 0.0, np.inf), task.top]),
+        **begun,
     )
     z = zero + np.array(answer["x"]).ravel()[:-1] * columns
     # An end of the box that is nearer than a hundredth of its width is what stopped a variable.
@@ -313,8 +344,19 @@ def _attempt(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, stra
         missed = max(solved.violation, task.excess(solved.F))
         message = f"it ended where limits are exceeded by {missed:.1e} of their scales" if missed > tolerance else ""
         solved = replace(solved, status=INFEASIBLE if message else CONVERGED, message=message)
-    of_rows, moving, resting = np.split(np.array(answer["lam_g"]).ravel(), np.cumsum([len(rows), len(task.scale)]))
-    return replace(solved, multipliers=np.concatenate([(moving + resting) / task.scale, of_rows / rows])), stuck
+    of_rows, moving, resting = np.split(np.array(answer["lam_g"]).ravel(), np.cumsum([len(rows), len(used)]))
+    of_objectives = (moving * (task.slope if task.summed else 1.0) + resting) / task.scale
+    return replace(solved, multipliers=Multipliers(of_objectives, of_rows / rows, np.array(answer["lam_x"]).ravel()[:-1] / columns)), stuck
+
+
+def _multipliers(task: _Task, found: Multipliers, columns: np.ndarray, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """What IPOPT begins with from multipliers, in the scales of a program: those of the objectives that move have a sum of 1 there."""
+    moving = found.of_objectives * task.scale
+    total = float(moving.sum() / task.slope.sum() if task.summed else moving @ task.slope)
+    if not total > 0.0:
+        return {}
+    of_rows = [found.of_rows * rows, [total] if task.summed else moving, np.zeros(len(moving))]
+    return {"lam_x0": np.append(found.of_bounds * columns, 0.0) / total, "lam_g0": np.concatenate(of_rows) / total}
 
 
 def ended(nlp: NLP, run: Watched, z: np.ndarray, start: np.ndarray, max_iterations: int) -> tuple[Solved, bool]:

@@ -1,0 +1,280 @@
+"""Any point of a front: solved from the points around its place, certified and simulated like all others."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from problems.checks import check_count
+from problems.sampling import refuse_peaks
+from transcription import from_dict
+from transcription.base import NLP, Transcription
+from transcription.nlp.derivatives import refuse_dense
+from transcription.nlp.optimality import Multipliers
+from transcription.nlp.scalarized import Solved
+from transcription.stopping import Stopped
+from transcription.trajectories.trajectory import Trajectory
+
+from ..evaluation.evaluator import CONVERGED, Counts
+from ..fronts.builders import certified, from_vectors
+from ..fronts.points import Points
+from ..fronts.provenance import costs, more_costs
+from ..fronts.verified import VERIFY, objective_scales, verified
+from ..gradients.ends import check_points, tasks_between
+from ..gradients.predictor import PREDICTION, Neighbour, coordinates, in_units, multipliers_at, predicted, shares
+from ..gradients.scalarised import GradientSolves, Scalarised, Start, best_of, strongly_optimal
+from ..io.console import working
+from ..io.interrupts import work_on_trajectories
+from ..io.workers import TOGETHER, Workers, each
+from ..pareto.dominance import distinct, extremes, ranges, separate
+from ..preferences.ranges import confidence, named_numbers, named_weights, places, shown
+from .mending import resolve_unverified
+from .mesh_loop import Programs, latest_programs
+
+log = logging.getLogger(__name__)
+
+
+def point_at(front: Points, goals: Mapping[str, float] | None, weights: Mapping[str, float] | None) -> Points:
+    """The point with given goals, or of the least weighted sum; see `Front.at`."""
+    if (goals is None) == (weights is None):
+        raise ValueError("say where: goals such as {'flight time': 150.0}, or weights={'flight time': 1.0, 'speed': 2.0}")
+    names, m = [goal.name for goal in front.goals], len(front.goals)
+    if weights is not None:
+        given = named_weights(weights)
+        wanted = np.zeros(m)
+        wanted[list(places(given, front.goals).values())] = list(given.values())
+        known = KnownPoints(front)
+        return known.found([known.least_sum(wanted)])
+    given = named_numbers(goals, "goals")
+    where = places(given, front.goals)
+    if len(given) == m:
+        raise ValueError(f"goals for all of {', '.join(names)} leave nothing to be best: nearest(...) takes such a reference")
+    known = KnownPoints(front)
+    limits = np.full(m, np.nan)
+    limits[list(where.values())] = list(given.values())
+    return known.found([known.within(limits * front.signs)])
+
+
+def nearest_point(front: Points, reference: Mapping[str, float]) -> Points:
+    """The point nearest to a reference; see `Front.nearest`."""
+    given = named_numbers(reference, "reference")
+    where = places(given, front.goals)
+    if len(given) < len(front.goals):
+        missing = next(goal.name for goal in front.goals if goal.name not in given)
+        raise ValueError(f"a reference has a value for each objective, and there is none for '{missing}': at(...) takes goals for some")
+    known = KnownPoints(front)
+    F = np.array([given[name] for name in sorted(where, key=lambda name: where[name])]) * front.signs
+    return known.found([known.nearest(F)])
+
+
+def dense_front(front: Points, n: int, time_limit: float | None, progress: bool | None, workers: Workers | None) -> Points:
+    """So many points all along the front; see `Front.dense`."""
+    check_count("n", n, 2)
+    check_points(n, len(front.goals))
+    known = KnownPoints(front)
+    with working(time_limit, progress, workers) as (show, interrupts):
+        points = known.dense(n, show)
+        elapsed, stopped = interrupts.elapsed, interrupts.reason
+    return points.replace(stats=more_costs(front.stats, known.counts, elapsed, stopped))
+
+
+@dataclass(frozen=True, eq=False)
+class KnownPoint:
+    """A point of a front, or a result of a solve, on its mesh."""
+
+    method: Transcription
+    z: np.ndarray
+    F: np.ndarray  # (m,)
+    trajectory: Trajectory | None = None  # of one of the front
+    multipliers: Multipliers | None = None  # of a result
+    row: int = -1  # in the front
+    note: str = ""
+    columns: dict[str, Any] = field(default_factory=dict)  # its certificate
+
+    def on(self, nlp: NLP, units: np.ndarray) -> Neighbour:
+        """It on the mesh of an NLP."""
+        if nlp.transcription != self.method:
+            return Neighbour(nlp.interpolate(self.trajectory or self.method.nlp(nlp.problem).unpack(self.z)), self.F, None)
+        found = self.multipliers or multipliers_at(nlp, self.z.tobytes(), tuple(units.tolist()))
+        return Neighbour(self.z, self.F, in_units(found, units))
+
+
+def _solved(
+    programs: Programs, method: Transcription, task: Scalarised, starts: Sequence[Start], bound: float, tolerance: float
+) -> tuple[Solved, dict[str, Any], Counts]:
+    """The result of a task from its starts, strongly optimal, with its certificate; and what it took."""
+    nlp, solves = programs(method), GradientSolves(tolerance)
+    found = best_of(task, solves, nlp, starts, bound)
+    if found.status != CONVERGED:
+        return found, {}, solves.counts
+    if found.multipliers is not None:
+
+        def solve(start: np.ndarray, other: Scalarised, near: bool) -> Solved:
+            return other.solve(solves, nlp, start, near)
+
+        found = strongly_optimal(solve, tolerance, found, found.multipliers.of_objectives, task.units)
+    return found, {name: column[0] for name, column in certified(nlp, found.z[None], task.units).items()}, solves.counts
+
+
+class KnownPoints:
+    """The points of a front, and solves between them."""
+
+    def __init__(self, front: Points) -> None:
+        if front.source is None:
+            raise ValueError("this front is of a black box, which has no dynamics to solve: evaluate it instead")
+        self.problem, self.front = front.compiled(), front
+        refuse_peaks(self.problem)
+        doubt = confidence(front)
+        good = [i for i in range(len(front)) if doubt[i] < 2 and front.trajectories[i] is not None and front.transcriptions[i] is not None]
+        # A point that a simulation refutes may promise too much.
+        good = [i for i in good if doubt[i] == 0] if sum(doubt[i] == 0 for i in good) > 1 else good
+        if len(good) < 2:
+            words = "no feasible point" if not good else "one feasible point"
+            raise ValueError(f"the front has {words}, and so no other point between its points: sweep or MACS().solve find more")
+        self.known = [
+            KnownPoint(from_dict(front.transcriptions[i] or {}), front[i].decision, front.F[i], front.trajectories[i], row=i) for i in good
+        ]
+        self.units = ranges(self.F)
+        self.programs, self.counts, self._began = latest_programs(self.problem), Counts(), time.perf_counter()
+
+    @property
+    def F(self) -> np.ndarray:
+        """Objectives (k, m) of all that is known."""
+        return np.array([one.F for one in self.known])
+
+    def within(self, limits: np.ndarray) -> KnownPoint:
+        """The point with limits (m,), not numbers where others are best: all of these alike, along their ranges."""
+        limited = ~np.isnan(limits)
+        if not (self.F[:, limited] <= limits[limited]).all(axis=1).any():
+            # First as near to the limits as can be.
+            closest = self.solved(Scalarised(np.where(limited, limits, np.inf), self.units, units=self.units))
+            self.known.append(closest)
+            over = (closest.F - limits)[limited] / self.units[limited]
+            if over.max() > PREDICTION.lost:
+                return replace(closest, note=f"{self._words(limits)} is out of reach: this is the point of the front nearest to it")
+        task = Scalarised(np.where(limited, limits, self.F.min(axis=0)), np.where(limited, 0.0, self.units), units=self.units)
+        found = self.solved(task)
+        spare = limited & (limits - found.F > PREDICTION.lost * self.units)
+        if not spare.any():
+            return found
+        return replace(found, note=f"{self._words(np.where(spare, limits, np.nan))} lies off the front: this point, with no less of the others, is better")
+
+    def least_sum(self, weights: np.ndarray) -> KnownPoint:
+        """The point of the least sum of objectives in their ranges times weights (m,)."""
+        reference = np.where(weights > 0, self.F.min(axis=0), np.inf)
+        return self.solved(Scalarised(reference, weights / self.units, units=self.units, summed=True))
+
+    def nearest(self, reference: np.ndarray) -> KnownPoint:
+        """The point nearest to a reference (m,), along the ranges."""
+        task = Scalarised(reference, self.units, units=self.units)
+        found = self.solved(task)
+        missed = task.loss(found.F)
+        if abs(missed) <= PREDICTION.lost:
+            return found
+        how = "it misses that by up to" if missed > 0 else "it is better in all by"
+        return replace(found, note=f"{self._words(reference)} lies off the front, of which this is the nearest point: {how} {abs(missed):.2g} of a range")
+
+    def solved(self, task: Scalarised) -> KnownPoint:
+        """The result of a task; the best point that is known where nothing better was found."""
+        return self.solved_all([task])[0]
+
+    def solved_all(self, tasks: Sequence[Scalarised]) -> list[KnownPoint]:
+        """The results of several tasks, side by side."""
+        pieces = [self._piece(task) for task in tasks]
+        found = []
+        for task, (method, *_), (solved, columns, counts) in zip(tasks, pieces, each(_solved, self.programs, pieces), strict=True):
+            self.counts = self.counts.joined(counts)
+            F, units = self.F, self.units
+            within = (F[:, task.hard] <= task.reference[task.hard] + PREDICTION.lost * units[task.hard]).all(axis=1)
+            losses = np.where(within, [task.loss(one) for one in F], np.inf)
+            best = int(np.argmin(losses))
+            if solved.status == CONVERGED and task.loss(solved.F) <= losses[best] + PREDICTION.lost:
+                found.append(KnownPoint(method, solved.z, solved.F, None, solved.multipliers, columns=columns))
+            else:
+                why = "" if solved.status == CONVERGED else f": {solved.message}"
+                found.append(replace(self.known[best], note=f"no solve found a better point for this place{why}"))
+        return found
+
+    def _piece(self, task: Scalarised) -> tuple[Any, ...]:
+        """What `_solved` needs for a task."""
+        X = coordinates(task, self.F)
+        parts = shares(X)
+        rows = np.flatnonzero(parts)
+        nlp = self.programs(self.known[rows[np.argmin((X[rows] ** 2).sum(axis=1))]].method)
+        refuse_dense(nlp)
+        around = [self.known[i].on(nlp, self.units) for i in rows]
+        return nlp.transcription, task, *predicted(task, nlp, around, parts[rows]), float(self.front.stats["tolerance"])
+
+    def dense(self, n: int, show: Any) -> Points:
+        """So many points, in even steps between the ends."""
+        F = self.F
+        ends = [self.known[i] for i in dict.fromkeys(extremes(F).tolist())]
+        waiting = tasks_between(F[extremes(F)], np.ptp(F, axis=0), n, "pascoletti-serafini")
+        waiting = [replace(task, units=self.units) for task in waiting]
+        found, total = list[KnownPoint](), len(waiting)
+        try:
+            while waiting:
+                show(f"dense: {len(found)} of {total} points")
+                some = self._farthest(waiting)
+                waiting = [task for task in waiting if not any(task is one for one in some)]
+                new = [one for one in self.solved_all(some) if one.row < 0]
+                found += new
+                self.known += new
+        except Stopped:
+            pass
+        every = [*ends, *found]
+        F = np.array([one.F for one in every])
+        kept = distinct(F, self.units)
+        kept[kept] = separate(F[kept], self.units)
+        points = self.found([one for one, keep in zip(every, kept.tolist(), strict=True) if keep], mend=False)
+        missing = n - len(points)
+        return points.sorted().replace(message=f"{missing} of {n} places have no point of their own." if missing else "")
+
+    def _farthest(self, tasks: Sequence[Scalarised]) -> list[Scalarised]:
+        """The tasks of the next batch: in turn that whose place is farthest from all points and places before."""
+        apart = np.array([np.linalg.norm(coordinates(task, self.F), axis=1).min() for task in tasks])
+        chosen = list[int]()
+        while len(chosen) < min(TOGETHER, len(tasks)):
+            chosen.append(int(np.argmax(apart)))
+            references = np.array([task.reference for task in tasks])
+            apart = np.minimum(apart, np.linalg.norm(coordinates(tasks[chosen[-1]], references), axis=1))
+            apart[chosen] = -1.0
+        return [tasks[i] for i in chosen]
+
+    def found(self, some: Sequence[KnownPoint], mend: bool = True) -> Points:
+        """Points, certified and simulated; those of the front as they are. What a simulation does not confirm is solved again."""
+        about = {"name": "at", "settings": {}}
+        front, scales, verify = self.front, objective_scales(self.front), self.front.stats.get("verify", VERIFY)
+        counts, elapsed = self.counts, time.perf_counter() - self._began
+        stats = costs(
+            counts,
+            wall_time=elapsed,
+            seed=front.stats["seed"],
+            tolerance=front.stats["tolerance"],
+            reproducible=not counts.clocked,
+        )
+        sets = [front[[one.row]].replace(notes=["; ".join(filter(None, [front.notes[one.row], one.note]))]) for one in some if one.row >= 0]
+        for method in dict.fromkeys(one.method for one in some if one.row < 0):
+            mine = [one for one in some if one.row < 0 and one.method == method]
+            columns = {name: [one.columns.get(name) for one in mine] for name in ("optimality", "costates", "weighted_gain")}
+            new = from_vectors(
+                self.programs(method), np.array([one.z for one in mine]), about, stats, notes=[one.note for one in mine], **columns
+            )
+            sets.append(new)
+        points = verified(Points.concatenate(sets).replace(solver=about, stats=stats), verify, scales)
+        if mend and not points.verified.all():
+            points = resolve_unverified(points, verify)
+        for note in filter(None, (one.note for one in some)):
+            log.info("%s: %s", front.source.name if front.source else "", note)
+        return points
+
+    def _words(self, limits: np.ndarray) -> str:
+        """Objectives (m,) in words; those that are no numbers are left out."""
+        front = self.front
+        known = [(goal, value * goal.sign) for goal, value in zip(front.goals, limits.tolist(), strict=True) if not np.isnan(value)]
+        return ", ".join(f"{goal.name} {shown(value, goal)}" for goal, value in known)
