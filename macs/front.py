@@ -131,8 +131,8 @@ class Front(Points):
         return point_at(self, goals, weights)[0]
 
     def nearest(self, reference: Mapping[str, float]) -> Point:
-        """The point of the front nearest to a reference, solved as by `at`: where the line from it, along the ranges of the front, meets the
-        front (Pascoletti and Serafini 1984).
+        """The point of the front nearest to a reference, solved as by `at`: where the line from it, along the ranges of the front, meets
+        the front (Pascoletti and Serafini 1984).
 
         Parameters
         ----------
@@ -158,9 +158,7 @@ class Front(Points):
         """
         return nearest_point(self, reference)[0]
 
-    def dense(
-        self, n: int, *, time_limit: float | None = None, workers: Workers | None = None, progress: bool | None = None
-    ) -> Front:
+    def dense(self, n: int, *, time_limit: float | None = None, workers: Workers | None = None, progress: bool | None = None) -> Front:
         """A front with so many points, each solved from its neighbours, certified and simulated.
 
         Parameters

@@ -36,8 +36,8 @@ PREDICTION = PredictionLimits()
 
 @dataclass(frozen=True, eq=False)
 class Neighbour:
-    """A point near a place: its vector z (n,) on the mesh of the solve, its objectives F (m,), and its multipliers there, if known, of which
-    those of the objectives have a sum of 1 in their units."""
+    """A point near a place: its vector z (n,) on the mesh of the solve, its objectives F (m,) and its multipliers, if known. Those of
+    the objectives have a sum of 1 in their units."""
 
     z: np.ndarray
     F: np.ndarray
@@ -65,12 +65,14 @@ def coordinates(task: Scalarised, F: np.ndarray) -> np.ndarray:
     moving, hard = task.moving, task.hard
     units = np.broadcast_to(task.units, task.weights.shape)
     places = across((F - task.reference)[:, moving] / task.weights[moving])
-    return np.hstack([(F - task.reference)[:, hard] / units[hard], places if moving.sum() > 1 else places[:, :0]])
+    # Across the diagonal of a plane there is one direction, and of a line none.
+    kept = places if moving.sum() > 2 else places[:, 1:]
+    return np.hstack([(F - task.reference)[:, hard] / units[hard], kept])
 
 
 def shares(X: np.ndarray) -> np.ndarray:
-    """The shares (k,) of points X (k, p) whose weighted mean is the origin: of the Delaunay simplex around it, of two points in one
-    dimension. Where nothing lies around it, the nearest point alone.
+    """The shares (k,) of points X (k, p) whose weighted mean is the origin: of the Delaunay simplex around it, in one dimension of the
+    nearest on both sides. Where nothing lies around it, the nearest point alone.
 
     The lifted points of that simplex are the lower side of a convex hull, and so the solution of a linear program: least mean of the
     squared distances.
@@ -79,11 +81,19 @@ def shares(X: np.ndarray) -> np.ndarray:
     alone = np.eye(len(X))[squares.argmin()]
     if squares.min() == 0.0 or len(X) == 1:
         return alone
+    if X.shape[1] == 1:
+        x = X[:, 0]
+        if not x.min() < 0.0 < x.max():
+            return alone
+        below, above = np.where(x < 0, x, -np.inf).argmax(), np.where(x > 0, x, np.inf).argmin()
+        found = np.zeros(len(x))
+        found[[below, above]] = np.array([x[above], -x[below]]) / (x[above] - x[below])
+        return found
     scale = np.sqrt(squares.max())
-    found = linprog(squares / scale**2, A_eq=np.vstack([X.T / scale, np.ones(len(X))]), b_eq=np.append(np.zeros(X.shape[1]), 1.0))
-    if found.status != 0:
+    program = linprog(squares / scale**2, A_eq=np.vstack([X.T / scale, np.ones(len(X))]), b_eq=np.append(np.zeros(X.shape[1]), 1.0))
+    if program.status != 0:
         return alone
-    kept = np.where(found.x > 1e-6, found.x, 0.0)
+    kept = np.where(program.x > 1e-6, program.x, 0.0)
     return np.asarray(kept / kept.sum())
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -48,16 +48,14 @@ def point_at(front: Points, goals: Mapping[str, float] | None, weights: Mapping[
         given = named_weights(weights)
         wanted = np.zeros(m)
         wanted[list(places(given, front.goals).values())] = list(given.values())
-        known = KnownPoints(front)
-        return known.found([known.least_sum(wanted)])
+        return found_alone(front, lambda known: known.least_sum(wanted))
     given = named_numbers(goals, "goals")
     where = places(given, front.goals)
     if len(given) == m:
         raise ValueError(f"goals for all of {', '.join(names)} leave nothing to be best: nearest(...) takes such a reference")
-    known = KnownPoints(front)
     limits = np.full(m, np.nan)
     limits[list(where.values())] = list(given.values())
-    return known.found([known.within(limits * front.signs)])
+    return found_alone(front, lambda known: known.within(limits * front.signs))
 
 
 def nearest_point(front: Points, reference: Mapping[str, float]) -> Points:
@@ -67,9 +65,19 @@ def nearest_point(front: Points, reference: Mapping[str, float]) -> Points:
     if len(given) < len(front.goals):
         missing = next(goal.name for goal in front.goals if goal.name not in given)
         raise ValueError(f"a reference has a value for each objective, and there is none for '{missing}': at(...) takes goals for some")
-    known = KnownPoints(front)
     F = np.array([given[name] for name in sorted(where, key=lambda name: where[name])]) * front.signs
-    return known.found([known.nearest(F)])
+    return found_alone(front, lambda known: known.nearest(F))
+
+
+def found_alone(front: Points, solve: Callable[[KnownPoints], KnownPoint]) -> Points:
+    """One point of a front, by one solve or a few."""
+    known = KnownPoints(front)
+    with work_on_trajectories():
+        points = known.found([one := solve(known)])
+        if points.verified.all():
+            return points
+        points = resolve_unverified(points, points.stats["verify"])
+        return points.replace(notes=["; ".join(dict.fromkeys(filter(None, [one.note, *points.notes])))])
 
 
 def dense_front(front: Points, n: int, time_limit: float | None, progress: bool | None, workers: Workers | None) -> Points:
@@ -162,7 +170,10 @@ class KnownPoints:
         spare = limited & (limits - found.F > PREDICTION.lost * self.units)
         if not spare.any():
             return found
-        return replace(found, note=f"{self._words(np.where(spare, limits, np.nan))} lies off the front: this point, with no less of the others, is better")
+        return replace(
+            found,
+            note=f"{self._words(np.where(spare, limits, np.nan))} lies off the front: this point, with no less of the others, is better",
+        )
 
     def least_sum(self, weights: np.ndarray) -> KnownPoint:
         """The point of the least sum of objectives in their ranges times weights (m,)."""
@@ -177,7 +188,10 @@ class KnownPoints:
         if abs(missed) <= PREDICTION.lost:
             return found
         how = "it misses that by up to" if missed > 0 else "it is better in all by"
-        return replace(found, note=f"{self._words(reference)} lies off the front, of which this is the nearest point: {how} {abs(missed):.2g} of a range")
+        return replace(
+            found,
+            note=f"{self._words(reference)} lies off the front, of which this is the nearest point: {how} {abs(missed):.2g} of a range",
+        )
 
     def solved(self, task: Scalarised) -> KnownPoint:
         """The result of a task; the best point that is known where nothing better was found."""
@@ -231,7 +245,7 @@ class KnownPoints:
         F = np.array([one.F for one in every])
         kept = distinct(F, self.units)
         kept[kept] = separate(F[kept], self.units)
-        points = self.found([one for one, keep in zip(every, kept.tolist(), strict=True) if keep], mend=False)
+        points = self.found([one for one, keep in zip(every, kept.tolist(), strict=True) if keep])
         missing = n - len(points)
         return points.sorted().replace(message=f"{missing} of {n} places have no point of their own." if missing else "")
 
@@ -246,8 +260,8 @@ class KnownPoints:
             apart[chosen] = -1.0
         return [tasks[i] for i in chosen]
 
-    def found(self, some: Sequence[KnownPoint], mend: bool = True) -> Points:
-        """Points, certified and simulated; those of the front as they are. What a simulation does not confirm is solved again."""
+    def found(self, some: Sequence[KnownPoint]) -> Points:
+        """Points, certified and simulated."""
         about = {"name": "at", "settings": {}}
         front, scales, verify = self.front, objective_scales(self.front), self.front.stats.get("verify", VERIFY)
         counts, elapsed = self.counts, time.perf_counter() - self._began
@@ -267,8 +281,6 @@ class KnownPoints:
             )
             sets.append(new)
         points = verified(Points.concatenate(sets).replace(solver=about, stats=stats), verify, scales)
-        if mend and not points.verified.all():
-            points = resolve_unverified(points, verify)
         for note in filter(None, (one.note for one in some)):
             log.info("%s: %s", front.source.name if front.source else "", note)
         return points

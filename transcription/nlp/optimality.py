@@ -15,9 +15,9 @@ from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, hstack, identity, 
 from scipy.sparse.linalg import SuperLU, splu
 
 from problems.compiled import CompiledPhase, CompiledProblem, remembered
-from problems.layers import mapped
 
 from ..base import NLP
+from ..numerics.batched import Batched, expanded
 from ..trajectories.costates import Costates, PhaseCostates
 from .derivatives import gradients
 from .program import nlp_scales
@@ -368,9 +368,16 @@ def hamiltonian(
     phase: CompiledPhase, costates: np.ndarray, weights: np.ndarray, x: np.ndarray, u: np.ndarray, t: np.ndarray, s: np.ndarray
 ) -> np.ndarray:
     """H (k,) at k places, from costates and states (k, nx), weights of the integrals (nq,), controls (k, nu), times (k,) and s (ns,)."""
-    inputs = x.T, u.T, t[None], s
-    rates, integrands = (np.array(mapped(function, len(t))(*inputs)).reshape(-1, len(t)) for function in (phase.dynamics, phase.integrands))
-    return np.asarray(np.einsum("ki,ik->k", costates, rates) + weights @ integrands)
+    rates, integrands = _rates(phase)(x, u, t, np.tile(s, (len(t), 1)))
+    return np.asarray(np.einsum("ki,ki->k", costates, rates) + integrands @ weights)
+
+
+@remembered
+def _rates(phase: CompiledPhase) -> Batched:
+    """(states, controls, time, s) -> rates and integrands."""
+    inputs = phase.dynamics.mx_in()
+    outputs = [ca.densify(function(*inputs)) for function in (phase.dynamics, phase.integrands)]
+    return Batched(expanded(ca.Function("rates", inputs, outputs)))
 
 
 def integral_weights(
