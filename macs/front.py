@@ -93,32 +93,27 @@ class Front(Points):
         return front_html(self, rendered(front_figure(self), "png", 80))
 
     def at(self, goals: Mapping[str, float] | None = None, *, weights: Mapping[str, float] | None = None) -> Point:
-        """Any point of the front, by its objectives: solved from the points around it, certified and simulated as these are.
+        """Any point of the front, solved from the points around its place in a few iterations, certified and simulated as these are.
 
-        A solve begins with the controls, states and multipliers that lie between those of its neighbours, on the mesh of the nearest one,
-        and takes a few iterations. If that is worse than what the neighbours promise, as between two valleys, it is solved from each of
-        them, and the best counts. What a simulation does not confirm is solved again, on finer meshes.
+        A solve begins with controls, states and multipliers between those of its neighbours, on the mesh of the nearest one. If its result
+        is worse than what these promise, as between two valleys, each of them is a start, too. What a simulation does not confirm is solved
+        again, as by `refine`.
 
         Parameters
         ----------
         goals : dict
-            Name of an objective -> the value that it has, in its unit, for some of the objectives. The other one is best there; several
-            others are so together, in proportion to their ranges. A goal is a limit: where the front has no such value, as in a gap or
-            beyond an end, the point has a better one, or the nearest one, and its `note` says so.
-        weights : dict, in place of goals
-            Name -> weight: the point with the least weighted sum of the objectives, each minimised, in ranges of the front. Objectives
-            without a weight do not count. Of a front that is not convex, it finds only the nearest such point to the best known one.
-
-        Returns
-        -------
-        Point
-            With a trajectory, `optimality`, `weights`, and marked as `verified` if a simulation agrees; `note` says what is to be known.
+            Name -> value, for some of the objectives: the other one is best there, several others together in proportion to their ranges. A
+            goal is a limit. Where the front has no such value, as in a gap or beyond an end, the `note` of the point says so: it has a
+            better one, or the nearest.
+        weights : dict
+            In place of goals: the least sum of the objectives, each minimised, in ranges of the front, times these weights. Where the front
+            is not convex, it is a local one near the best of the front's points.
 
         Raises
         ------
         ValueError
-            For a black box or a vector problem, which has no dynamics to solve; a front whose problem is not known, see `Front.load`; one
-            with fewer than two points; unknown names; goals for all objectives, see `nearest`; and peaks without derivatives.
+            For a black box or a vector problem, which have no dynamics to solve; a problem that is not known, see `Front.load`; fewer than
+            two points; unknown names; goals for all objectives, see `nearest`; and peaks without derivatives.
 
         Examples
         --------
@@ -132,17 +127,12 @@ class Front(Points):
 
     def nearest(self, reference: Mapping[str, float]) -> Point:
         """The point of the front nearest to a reference, solved as by `at`: where the line from it, along the ranges of the front, meets
-        the front (Pascoletti and Serafini 1984).
+        the front (Pascoletti and Serafini 1984). Its `note` says how far the reference lies off the front.
 
         Parameters
         ----------
         reference : dict
             Name -> value, for each objective, on either side of the front.
-
-        Returns
-        -------
-        Point
-            Its `note` says how far the reference lies off the front.
 
         Raises
         ------
@@ -159,24 +149,16 @@ class Front(Points):
         return nearest_point(self, reference)[0]
 
     def dense(self, n: int, *, time_limit: float | None = None, workers: Workers | None = None, progress: bool | None = None) -> Front:
-        """A front with so many points, each solved from its neighbours, certified and simulated.
+        """A front of n points, solved from their neighbours as by `at`: of two objectives in even steps along the line between the ends, of
+        more on a lattice on the simplex between these, and at most n. `message` says how many places have no point of their own, as in a
+        gap.
 
         Parameters
         ----------
         n : int
-            Number of points, the ends of this front included. Of two objectives they are in even steps along the line between the ends, of
-            more on a lattice on the simplex between the ends, and n is the most. Where a front has a gap, there are fewer.
-        time_limit : float, optional
-            Seconds after which the work ends with the results so far.
-        workers : int, "all" or Executor, optional
-            Processes that work side by side, see `optimize`.
-        progress : bool, optional
-            Show the progress on stderr. Default: on a terminal and in a notebook, from the third second on.
-
-        Returns
-        -------
-        Front
-            Its `message` says how many places have no point of their own.
+            The ends of this front included.
+        time_limit, workers, progress
+            As for `optimize`.
 
         Raises
         ------
@@ -186,13 +168,11 @@ class Front(Points):
         Examples
         --------
         >>> import macs, problems
-        >>> front = macs.sweep(problems.load("goddard"), points=3, starts=1)
-        >>> dense = front.dense(9)
+        >>> dense = macs.sweep(problems.load("goddard"), points=3, starts=1).dense(9)
         >>> len(dense), bool(dense.verified.all())
         (9, True)
         """
-        with processes(workers):
-            return Front.of(dense_front(self, n, time_limit, progress, workers))
+        return Front.of(dense_front(self, n, time_limit, progress, workers))
 
     def refine(
         self,

@@ -120,7 +120,10 @@ class Decisions:
         Raises ValueError if a vector has not as many entries as variables.
         """
         common = tuple(v for v in variables if isinstance(v, Variable))
-        each = [tuple(own) for own in variables if not isinstance(own, Variable)] or [common] * len(rows)
+        each = [tuple(own) for own in variables if not isinstance(own, Variable)]
+        if not each and all(len(row) == len(common) for row in rows):
+            return cls.placed(common, np.array(rows, dtype=float).reshape(len(rows), len(common)), [np.arange(len(common))] * len(rows))
+        each = each or [common] * len(rows)
         columns: dict[Variable, int] = {}
         places = {own: np.array([columns.setdefault(v, len(columns)) for v in own], dtype=int) for own in dict.fromkeys([common, *each])}
         values = np.full((len(rows), len(columns)), np.nan)

@@ -1,9 +1,7 @@
 """Where solves between the points of a front begin: vectors and multipliers, predicted from the points around a place on it.
 
-Where a front is smooth, so are its optimal vectors and their multipliers along it. Interpolated between the points around a place, both are
-nearly those of the optimum there, and a warm start of an interior point method needs few iterations: on ascents 2 to 3 where the nearest
-point alone takes 7, on a rocket with two stages 4 instead of 15. Where neighbours lie in different valleys, what is between them is no
-solution: then each is a start of its own, and the better result counts.
+Where a front is smooth, so are both along it, and a warm start from what is between the points around a place takes few iterations: 2 to 7
+where one from the nearest point takes 7 to 15. Between different valleys nothing lies: then each of these points is a start.
 """
 
 from __future__ import annotations
@@ -28,7 +26,8 @@ class PredictionLimits:
     """When a prediction is believed."""
 
     smooth: float = 1e-2  # violation of an interpolated vector up to which the points around it are taken to lie in one valley
-    lost: float = 1e-6  # of the range of an objective, that a result may be worse than what the points around it promise
+    lost: float = 1e-6  # of the range of an objective, that counts as none
+    doubt: float = 0.25  # part of how far the points around a place differ in what they promise, by which a result may be worse than that
 
 
 PREDICTION = PredictionLimits()
@@ -72,11 +71,7 @@ def coordinates(task: Scalarised, F: np.ndarray) -> np.ndarray:
 
 def shares(X: np.ndarray) -> np.ndarray:
     """The shares (k,) of points X (k, p) whose weighted mean is the origin: of the Delaunay simplex around it, in one dimension of the
-    nearest on both sides. Where nothing lies around it, the nearest point alone.
-
-    The lifted points of that simplex are the lower side of a convex hull, and so the solution of a linear program: least mean of the
-    squared distances.
-    """
+    nearest on both sides. Where nothing lies around it, the nearest point alone. That simplex has the least mean of squared distances."""
     squares = (X**2).sum(axis=1)
     alone = np.eye(len(X))[squares.argmin()]
     if squares.min() == 0.0 or len(X) == 1:
@@ -105,17 +100,12 @@ def predicted(task: Scalarised, nlp: NLP, around: Sequence[Neighbour], parts: np
         z = back_in_bounds(nlp, parts @ np.array([one.z for one in around]))
         if nlp.evaluate(z[None])[1][0] <= PREDICTION.smooth:
             found.append(Start(z, True, PREDICTION.lost, _mixed(around, parts)))
-    found += [Start(around[i].z, True, PREDICTION.lost, around[i].multipliers) for i in near]
-    found.append(Start(around[near[0]].z, drift=PREDICTION.lost))
-    return found, promised(task, around, parts)
+    return [*found, *(Start(around[i].z, True, PREDICTION.lost, around[i].multipliers) for i in near)], promised(task, around, parts)
 
 
 def promised(task: Scalarised, around: Sequence[Neighbour], parts: np.ndarray) -> float:
-    """The loss at a place at most, as far as the points around it tell.
-
-    Where a front is convex, it is no more than that of their mean. Where it is not, it is no more than on the best of the tangents at these
-    points; so it is between two valleys, too.
-    """
+    """The loss at a place at most, as far as the points around it tell: where a front is convex, that of their mean, and where it is not,
+    as between two valleys, that on the best of their tangents."""
     F, units = np.array([one.F for one in around]), np.broadcast_to(task.units, task.weights.shape)
     within = ((F - task.reference)[:, task.hard] <= PREDICTION.lost * units[task.hard]).all(axis=1)
     known = min((task.loss(one) for one in F[within]), default=np.inf)
@@ -128,7 +118,8 @@ def promised(task: Scalarised, around: Sequence[Neighbour], parts: np.ndarray) -
         if slope > 1e-6 * float(weights @ units):
             above = np.where(task.used, one.F - task.reference, 0.0)
             tangents.append(float(weights @ above) / slope)
-    return min(known, max(float(task.alpha(parts @ F)), min(tangents, default=-np.inf)))
+    losses = [float(task.alpha(parts @ F)), *tangents]
+    return min(known, max(losses[0], min(losses[1:], default=-np.inf)) + PREDICTION.doubt * float(np.ptp(losses)))
 
 
 def _mixed(around: Sequence[Neighbour], parts: np.ndarray) -> Multipliers | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,7 +18,7 @@ from transcription.base import NLP, Transcription
 from transcription.nlp.derivatives import refuse_dense
 from transcription.nlp.optimality import Multipliers
 from transcription.nlp.scalarized import Solved
-from transcription.stopping import Stopped
+from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED, Counts
@@ -43,30 +44,28 @@ def point_at(front: Points, goals: Mapping[str, float] | None, weights: Mapping[
     """The point with given goals, or of the least weighted sum; see `Front.at`."""
     if (goals is None) == (weights is None):
         raise ValueError("say where: goals such as {'flight time': 150.0}, or weights={'flight time': 1.0, 'speed': 2.0}")
-    names, m = [goal.name for goal in front.goals], len(front.goals)
     if weights is not None:
-        given = named_weights(weights)
-        wanted = np.zeros(m)
-        wanted[list(places(given, front.goals).values())] = list(given.values())
-        return found_alone(front, lambda known: known.least_sum(wanted))
-    given = named_numbers(goals, "goals")
-    where = places(given, front.goals)
-    if len(given) == m:
-        raise ValueError(f"goals for all of {', '.join(names)} leave nothing to be best: nearest(...) takes such a reference")
-    limits = np.full(m, np.nan)
-    limits[list(where.values())] = list(given.values())
+        shares = np.nan_to_num(_values(front, named_weights(weights)))
+        return found_alone(front, lambda known: known.least_sum(shares))
+    limits = _values(front, named_numbers(goals, "goals"))
+    if not np.isnan(limits).any():
+        raise ValueError(f"goals for all of {', '.join(front.names)} leave nothing to be best: nearest(...) takes such a reference")
     return found_alone(front, lambda known: known.within(limits * front.signs))
 
 
 def nearest_point(front: Points, reference: Mapping[str, float]) -> Points:
     """The point nearest to a reference; see `Front.nearest`."""
-    given = named_numbers(reference, "reference")
-    where = places(given, front.goals)
-    if len(given) < len(front.goals):
-        missing = next(goal.name for goal in front.goals if goal.name not in given)
+    values = _values(front, named_numbers(reference, "reference"))
+    if np.isnan(values).any():
+        missing = front.names[int(np.isnan(values).argmax())]
         raise ValueError(f"a reference has a value for each objective, and there is none for '{missing}': at(...) takes goals for some")
-    F = np.array([given[name] for name in sorted(where, key=lambda name: where[name])]) * front.signs
-    return found_alone(front, lambda known: known.nearest(F))
+    return found_alone(front, lambda known: known.nearest(values * front.signs))
+
+
+def _values(front: Points, given: Mapping[str, float]) -> np.ndarray:
+    """Values by name (m,); no numbers for objectives without one."""
+    places(given, front.goals)
+    return np.array([given.get(name, np.nan) for name in front.names])
 
 
 def found_alone(front: Points, solve: Callable[[KnownPoints], KnownPoint]) -> Points:
@@ -119,13 +118,12 @@ def _solved(
     nlp, solves = programs(method), GradientSolves(tolerance)
     found = best_of(task, solves, nlp, starts, bound)
     if found.status != CONVERGED:
+        found = task.solve(solves, nlp, starts[-1].z)
+    if found.status != CONVERGED:
         return found, {}, solves.counts
     if found.multipliers is not None:
-
-        def solve(start: np.ndarray, other: Scalarised, near: bool) -> Solved:
-            return other.solve(solves, nlp, start, near)
-
-        found = strongly_optimal(solve, tolerance, found, found.multipliers.of_objectives, task.units)
+        weights = found.multipliers.of_objectives
+        found = strongly_optimal(lambda z, other, near: other.solve(solves, nlp, z, near), tolerance, found, weights, task.units)
     return found, {name: column[0] for name, column in certified(nlp, found.z[None], task.units).items()}, solves.counts
 
 
@@ -167,13 +165,8 @@ class KnownPoints:
                 return replace(closest, note=f"{self._words(limits)} is out of reach: this is the point of the front nearest to it")
         task = Scalarised(np.where(limited, limits, self.F.min(axis=0)), np.where(limited, 0.0, self.units), units=self.units)
         found = self.solved(task)
-        spare = limited & (limits - found.F > PREDICTION.lost * self.units)
-        if not spare.any():
-            return found
-        return replace(
-            found,
-            note=f"{self._words(np.where(spare, limits, np.nan))} lies off the front: this point, with no less of the others, is better",
-        )
+        spare = self._words(np.where(limited & (limits - found.F > PREDICTION.lost * self.units), limits, np.nan))
+        return replace(found, note=f"{spare} lies off the front: this point is better, and no worse in the others") if spare else found
 
     def least_sum(self, weights: np.ndarray) -> KnownPoint:
         """The point of the least sum of objectives in their ranges times weights (m,)."""
@@ -184,14 +177,10 @@ class KnownPoints:
         """The point nearest to a reference (m,), along the ranges."""
         task = Scalarised(reference, self.units, units=self.units)
         found = self.solved(task)
-        missed = task.loss(found.F)
+        missed, words = task.loss(found.F), f"{self._words(reference)} lies off the front: this point "
         if abs(missed) <= PREDICTION.lost:
             return found
-        how = "it misses that by up to" if missed > 0 else "it is better in all by"
-        return replace(
-            found,
-            note=f"{self._words(reference)} lies off the front, of which this is the nearest point: {how} {abs(missed):.2g} of a range",
-        )
+        return replace(found, note=f"{words}{'misses it by up to' if missed > 0 else 'is better in all by'} {abs(missed):.2g} of a range")
 
     def solved(self, task: Scalarised) -> KnownPoint:
         """The result of a task; the best point that is known where nothing better was found."""
@@ -203,9 +192,8 @@ class KnownPoints:
         found = []
         for task, (method, *_), (solved, columns, counts) in zip(tasks, pieces, each(_solved, self.programs, pieces), strict=True):
             self.counts = self.counts.joined(counts)
-            F, units = self.F, self.units
-            within = (F[:, task.hard] <= task.reference[task.hard] + PREDICTION.lost * units[task.hard]).all(axis=1)
-            losses = np.where(within, [task.loss(one) for one in F], np.inf)
+            within = (self.F - task.reference <= PREDICTION.lost * self.units)[:, task.hard].all(axis=1)
+            losses = np.where(within, [task.loss(one) for one in self.F], np.inf)
             best = int(np.argmin(losses))
             if solved.status == CONVERGED and task.loss(solved.F) <= losses[best] + PREDICTION.lost:
                 found.append(KnownPoint(method, solved.z, solved.F, None, solved.multipliers, columns=columns))
@@ -226,64 +214,53 @@ class KnownPoints:
 
     def dense(self, n: int, show: Any) -> Points:
         """So many points, in even steps between the ends."""
-        F = self.F
-        ends = [self.known[i] for i in dict.fromkeys(extremes(F).tolist())]
-        waiting = tasks_between(F[extremes(F)], np.ptp(F, axis=0), n, "pascoletti-serafini")
-        waiting = [replace(task, units=self.units) for task in waiting]
-        found, total = list[KnownPoint](), len(waiting)
-        try:
-            while waiting:
-                show(f"dense: {len(found)} of {total} points")
+        F, best = self.F, extremes(self.F)
+        waiting = [replace(one, units=self.units) for one in tasks_between(F[best], np.ptp(F, axis=0), n, "pascoletti-serafini")]
+        found = [self.known[i] for i in dict.fromkeys(best.tolist())]
+        with suppress(Stopped):  # with what there is until then
+            while waiting and not stopping():
+                show(f"dense: {len(found)} of {n} points")
                 some = self._farthest(waiting)
-                waiting = [task for task in waiting if not any(task is one for one in some)]
-                new = [one for one in self.solved_all(some) if one.row < 0]
-                found += new
-                self.known += new
-        except Stopped:
-            pass
-        every = [*ends, *found]
-        F = np.array([one.F for one in every])
+                new = [one for one in self.solved_all([waiting[i] for i in some]) if one.row < 0]
+                waiting = [one for i, one in enumerate(waiting) if i not in some]
+                found, self.known = found + new, self.known + new
+        F = np.array([one.F for one in found])
         kept = distinct(F, self.units)
         kept[kept] = separate(F[kept], self.units)
-        points = self.found([one for one, keep in zip(every, kept.tolist(), strict=True) if keep])
+        points = self.found([one for one, keep in zip(found, kept.tolist(), strict=True) if keep])
         missing = n - len(points)
         return points.sorted().replace(message=f"{missing} of {n} places have no point of their own." if missing else "")
 
-    def _farthest(self, tasks: Sequence[Scalarised]) -> list[Scalarised]:
+    def _farthest(self, tasks: Sequence[Scalarised]) -> list[int]:
         """The tasks of the next batch: in turn that whose place is farthest from all points and places before."""
+        references = np.array([task.reference for task in tasks])
         apart = np.array([np.linalg.norm(coordinates(task, self.F), axis=1).min() for task in tasks])
         chosen = list[int]()
         while len(chosen) < min(TOGETHER, len(tasks)):
             chosen.append(int(np.argmax(apart)))
-            references = np.array([task.reference for task in tasks])
             apart = np.minimum(apart, np.linalg.norm(coordinates(tasks[chosen[-1]], references), axis=1))
             apart[chosen] = -1.0
-        return [tasks[i] for i in chosen]
+        return chosen
 
     def found(self, some: Sequence[KnownPoint]) -> Points:
         """Points, certified and simulated."""
-        about = {"name": "at", "settings": {}}
-        front, scales, verify = self.front, objective_scales(self.front), self.front.stats.get("verify", VERIFY)
-        counts, elapsed = self.counts, time.perf_counter() - self._began
-        stats = costs(
-            counts,
-            wall_time=elapsed,
-            seed=front.stats["seed"],
-            tolerance=front.stats["tolerance"],
-            reproducible=not counts.clocked,
-        )
-        sets = [front[[one.row]].replace(notes=["; ".join(filter(None, [front.notes[one.row], one.note]))]) for one in some if one.row >= 0]
-        for method in dict.fromkeys(one.method for one in some if one.row < 0):
-            mine = [one for one in some if one.row < 0 and one.method == method]
-            columns = {name: [one.columns.get(name) for one in mine] for name in ("optimality", "costates", "weighted_gain")}
-            new = from_vectors(
-                self.programs(method), np.array([one.z for one in mine]), about, stats, notes=[one.note for one in mine], **columns
-            )
-            sets.append(new)
-        points = verified(Points.concatenate(sets).replace(solver=about, stats=stats), verify, scales)
+        front, counts = self.front, self.counts
+        more = {"seed": front.stats["seed"], "tolerance": front.stats["tolerance"], "reproducible": not counts.clocked}
+        stats = costs(counts, wall_time=time.perf_counter() - self._began, **more)
+        about, sets = {"name": "at", "settings": {}}, list[Points]()
+        for method in dict.fromkeys(one.method for one in some):
+            mine = [one for one in some if one.method == method]
+            old, new = [one for one in mine if one.row >= 0], [one for one in mine if one.row < 0]
+            if old:
+                sets.append(front[[one.row for one in old]].replace(notes=[one.note for one in old]))
+            if new:
+                columns = {name: [one.columns.get(name) for one in new] for name in ("optimality", "costates", "weighted_gain")}
+                Z, notes = np.array([one.z for one in new]), [one.note for one in new]
+                sets.append(from_vectors(self.programs(method), Z, about, stats, notes=notes, **columns))
+        points = (sets[0] if len(sets) == 1 else Points.concatenate(sets)).replace(solver=about, stats=stats)
         for note in filter(None, (one.note for one in some)):
-            log.info("%s: %s", front.source.name if front.source else "", note)
-        return points
+            log.info("%s: %s", self.problem.name, note)
+        return verified(points, front.stats.get("verify", VERIFY), objective_scales(front))
 
     def _words(self, limits: np.ndarray) -> str:
         """Objectives (m,) in words; those that are no numbers are left out."""

@@ -72,8 +72,6 @@ class _Strategy:
     equilibrated: bool = True  # whether variables and rows are
 
 
-WARMED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
-"""What IPOPT would move away from limits before a warm start."""
 COMMON: Options = (
     ("tol", SOLVE.accuracy),
     ("acceptable_tol", 100 * SOLVE.accuracy),
@@ -95,15 +93,10 @@ NEAR = _Strategy(
 """Stays in the basin of a feasible start."""
 INSIDE = _Strategy(NEAR.options, share=0.3)
 """From the optimum of almost the same: little has to change."""
-WARM = _Strategy(
-    (
-        ("warm_start_init_point", "yes"),
-        ("mu_strategy", "adaptive"),
-        ("mu_init", 1e-8),
-        *((f"warm_start_{what}", SOLVE.accuracy) for what in WARMED),
-    ),
-    share=0.2,
-)
+WARMED: Options = (("warm_start_init_point", "yes"), ("mu_strategy", "adaptive"), ("mu_init", 1e-8))
+MOVED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
+"""What IPOPT would move away from limits before a warm start."""
+WARM = _Strategy((*WARMED, *((f"warm_start_{what}", SOLVE.accuracy) for what in MOVED)), share=0.2)
 """From a vector with its multipliers: both are nearly those of the optimum."""
 UNSCALED = _Strategy((("mu_strategy", "adaptive"),), share=0.3, equilibrated=False)
 """In the scales of the problem, where the derivatives at the start say little about those at the optimum."""
@@ -205,7 +198,7 @@ def scalarize(
     if stopping():
         return not_begun(nlp, start)
     try:
-        task = _task(nlp, start, reference, weights, ceiling, margin, summed)
+        task = _task(nlp, start, reference, weights, ceiling, margin, summed=summed)
     except Stopped:  # while derivatives were built
         return not_begun(nlp, start)
     if not np.isfinite(start).all():  # a peak of what is infinite there; IPOPT would not begin
@@ -266,16 +259,10 @@ def not_begun(nlp: NLP, start: np.ndarray) -> Solved:
     return Solved(start, F[0], float(violation[0]), TIMEOUT, 0, clocked=True, begun=False, message="it was not begun")
 
 
-def _task(
-    nlp: NLP,
-    start: np.ndarray,
-    reference: np.ndarray,
-    weights: np.ndarray,
-    ceiling: np.ndarray | None,
-    margin: np.ndarray | None,
-    summed: bool,
-) -> _Task:
-    limits = np.full(len(reference), np.inf) if ceiling is None else ceiling
+def _task(nlp: NLP, start: np.ndarray, reference: np.ndarray, weights: np.ndarray, *limits: np.ndarray | None, summed: bool) -> _Task:
+    """limits: ceiling (m,), margin (r,)."""
+    ceiling, margin = limits
+    top = np.full(len(reference), np.inf) if ceiling is None else ceiling
     inside = np.zeros(len(nlp.g_scale)) if margin is None else margin
     used = reference < np.inf
     moving = used & (weights > 0)
@@ -291,7 +278,7 @@ def _task(
     slope = np.where(moving, weights, 0.0) * (scale if summed else 1.0 / scale)
     lower, upper = nlp.g_lower / nlp.g_scale, nlp.g_upper / nlp.g_scale
     inside = np.minimum(inside, 0.5 * (upper - lower))
-    return _Task(shift, scale, slope / slope.max(), used, (limits - shift) / scale, lower + inside, upper - inside, summed)
+    return _Task(shift, scale, slope / slope.max(), used, (top - shift) / scale, lower + inside, upper - inside, summed)
 
 
 def _unstuck(nlp: NLP, task: _Task, start: np.ndarray, settings: _Settings, strategy: _Strategy) -> Solved:

@@ -35,6 +35,8 @@ def paths_and_peaks(
     phase: CompiledPhase, states: np.ndarray, controls: np.ndarray, times: np.ndarray, s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Path constraints (k, c) and peaks (k, p) at k places of a trajectory whose times and parameters are `s` (ns,)."""
+    if not phase.path.numel_out() + phase.peaks.numel_out():
+        return np.empty((len(times), 0)), np.empty((len(times), 0))
     paths, peaks = _paths_and_peaks_function(phase)(states, controls, times, np.tile(s, (len(times), 1)))
     return paths, peaks
 
