@@ -18,19 +18,8 @@ from transcription.nlp.optimality import Conditions, Multipliers
 from transcription.nlp.program import back_in_bounds
 
 from ..pareto.directions import across
-from .scalarised import Scalarised, Start
-
-
-@dataclass(frozen=True)
-class PredictionLimits:
-    """When a prediction is believed."""
-
-    smooth: float = 1e-2  # violation of an interpolated vector up to which the points around it are taken to lie in one valley
-    lost: float = 1e-6  # of the range of an objective, that counts as none
-    doubt: float = 0.25  # part of how far the points around a place differ in what they promise, by which a result may be worse than that
-
-
-PREDICTION = PredictionLimits()
+from ..pareto.dominance import BETTER
+from .scalarised import END, Scalarised, Start
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,16 +87,16 @@ def predicted(task: Scalarised, nlp: NLP, around: Sequence[Neighbour], parts: np
     near = np.argsort(np.linalg.norm(coordinates(task, F), axis=1), kind="stable").tolist()
     if len(around) > 1:
         z = back_in_bounds(nlp, parts @ np.array([one.z for one in around]))
-        if nlp.evaluate(z[None])[1][0] <= PREDICTION.smooth:
-            found.append(Start(z, True, PREDICTION.lost, _mixed(around, parts)))
-    return [*found, *(Start(around[i].z, True, PREDICTION.lost, around[i].multipliers) for i in near)], promised(task, around, parts)
+        if nlp.evaluate(z[None])[1][0] <= END.close:
+            found.append(Start(z, True, BETTER, _mixed(around, parts)))
+    return [*found, *(Start(around[i].z, True, BETTER, around[i].multipliers) for i in near)], promised(task, around, parts)
 
 
 def promised(task: Scalarised, around: Sequence[Neighbour], parts: np.ndarray) -> float:
     """The loss at a place at most, as far as the points around it tell: where a front is convex, that of their mean, and where it is not,
     as between two valleys, that on the best of their tangents."""
     F, units = np.array([one.F for one in around]), np.broadcast_to(task.units, task.weights.shape)
-    within = ((F - task.reference)[:, task.hard] <= PREDICTION.lost * units[task.hard]).all(axis=1)
+    within = ((F - task.reference)[:, task.hard] <= BETTER * units[task.hard]).all(axis=1)
     known = min((task.loss(one) for one in F[within]), default=np.inf)
     if len(around) == 1 or task.summed:
         return known
@@ -119,7 +108,7 @@ def promised(task: Scalarised, around: Sequence[Neighbour], parts: np.ndarray) -
             above = np.where(task.used, one.F - task.reference, 0.0)
             tangents.append(float(weights @ above) / slope)
     losses = [float(task.alpha(parts @ F)), *tangents]
-    return min(known, max(losses[0], min(losses[1:], default=-np.inf)) + PREDICTION.doubt * float(np.ptp(losses)))
+    return min(known, max(losses[0], min(losses[1:], default=-np.inf)) + END.unsure * float(np.ptp(losses)))
 
 
 def _mixed(around: Sequence[Neighbour], parts: np.ndarray) -> Multipliers | None:

@@ -27,12 +27,12 @@ from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, objective_scales, verified
 from ..gradients.ends import check_points, tasks_between
-from ..gradients.predictor import PREDICTION, Neighbour, coordinates, in_units, multipliers_at, predicted, shares
+from ..gradients.predictor import Neighbour, coordinates, in_units, multipliers_at, predicted, shares
 from ..gradients.scalarised import GradientSolves, Scalarised, Start, best_of, strongly_optimal
 from ..io.console import working
 from ..io.interrupts import work_on_trajectories
 from ..io.workers import TOGETHER, Workers, each
-from ..pareto.dominance import distinct, extremes, ranges, separate
+from ..pareto.dominance import BETTER, distinct, extremes, ranges, separate
 from ..preferences.ranges import confidence, named_numbers, named_weights, places, shown
 from .mending import resolve_unverified
 from .mesh_loop import Programs, latest_programs
@@ -99,7 +99,7 @@ class KnownPoint:
     F: np.ndarray  # (m,)
     trajectory: Trajectory | None = None  # of one of the front
     multipliers: Multipliers | None = None  # of a result
-    row: int = -1  # in the front
+    row: int | None = None  # in the front
     note: str = ""
     columns: dict[str, Any] = field(default_factory=dict)  # its certificate
 
@@ -161,11 +161,11 @@ class KnownPoints:
             closest = self.solved(Scalarised(np.where(limited, limits, np.inf), self.units, units=self.units))
             self.known.append(closest)
             over = (closest.F - limits)[limited] / self.units[limited]
-            if over.max() > PREDICTION.lost:
+            if over.max() > BETTER:
                 return replace(closest, note=f"{self._words(limits)} is out of reach: this is the point of the front nearest to it")
         task = Scalarised(np.where(limited, limits, self.F.min(axis=0)), np.where(limited, 0.0, self.units), units=self.units)
         found = self.solved(task)
-        spare = self._words(np.where(limited & (limits - found.F > PREDICTION.lost * self.units), limits, np.nan))
+        spare = self._words(np.where(limited & (limits - found.F > BETTER * self.units), limits, np.nan))
         return replace(found, note=f"{spare} lies off the front: this point is better, and no worse in the others") if spare else found
 
     def least_sum(self, weights: np.ndarray) -> KnownPoint:
@@ -178,7 +178,7 @@ class KnownPoints:
         task = Scalarised(reference, self.units, units=self.units)
         found = self.solved(task)
         missed, words = task.loss(found.F), f"{self._words(reference)} lies off the front: this point "
-        if abs(missed) <= PREDICTION.lost:
+        if abs(missed) <= BETTER:
             return found
         return replace(found, note=f"{words}{'misses it by up to' if missed > 0 else 'is better in all by'} {abs(missed):.2g} of a range")
 
@@ -192,10 +192,10 @@ class KnownPoints:
         found = []
         for task, (method, *_), (solved, columns, counts) in zip(tasks, pieces, each(_solved, self.programs, pieces), strict=True):
             self.counts = self.counts.joined(counts)
-            within = (self.F - task.reference <= PREDICTION.lost * self.units)[:, task.hard].all(axis=1)
+            within = (self.F - task.reference <= BETTER * self.units)[:, task.hard].all(axis=1)
             losses = np.where(within, [task.loss(one) for one in self.F], np.inf)
             best = int(np.argmin(losses))
-            if solved.status == CONVERGED and task.loss(solved.F) <= losses[best] + PREDICTION.lost:
+            if solved.status == CONVERGED and task.loss(solved.F) <= losses[best] + BETTER:
                 found.append(KnownPoint(method, solved.z, solved.F, None, solved.multipliers, columns=columns))
             else:
                 why = "" if solved.status == CONVERGED else f": {solved.message}"
@@ -221,7 +221,7 @@ class KnownPoints:
             while waiting and not stopping():
                 show(f"dense: {len(found)} of {n} points")
                 some = self._farthest(waiting)
-                new = [one for one in self.solved_all([waiting[i] for i in some]) if one.row < 0]
+                new = [one for one in self.solved_all([waiting[i] for i in some]) if one.row is None]
                 waiting = [one for i, one in enumerate(waiting) if i not in some]
                 found, self.known = found + new, self.known + new
         F = np.array([one.F for one in found])
@@ -250,7 +250,7 @@ class KnownPoints:
         about, sets = {"name": "at", "settings": {}}, list[Points]()
         for method in dict.fromkeys(one.method for one in some):
             mine = [one for one in some if one.method == method]
-            old, new = [one for one in mine if one.row >= 0], [one for one in mine if one.row < 0]
+            old, new = [one for one in mine if one.row is not None], [one for one in mine if one.row is None]
             if old:
                 sets.append(front[[one.row for one in old]].replace(notes=[one.note for one in old]))
             if new:
