@@ -85,8 +85,9 @@ def predicted(task: Scalarised, nlp: NLP, around: Sequence[Neighbour], parts: np
     """Starts for a task, in turn, and the loss that a good result has at most, from the points around its place and their shares (k,)."""
     F, found = np.array([one.F for one in around]), list[Start]()
     near = np.argsort(np.linalg.norm(coordinates(task, F), axis=1), kind="stable").tolist()
-    if len(around) > 1:
-        z = back_in_bounds(nlp, parts @ np.array([one.z for one in around]))
+    Z = np.array([one.z for one in around])
+    if len(around) > 1 and (Z[:, nlp.integers] == Z[0, nlp.integers]).all():
+        z = back_in_bounds(nlp, parts @ Z)
         if nlp.evaluate(z[None])[1][0] <= END.close:
             found.append(Start(z, True, BETTER, _mixed(around, parts)))
     return [*found, *(Start(around[i].z, True, BETTER, around[i].multipliers) for i in near)], promised(task, around, parts)
