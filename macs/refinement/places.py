@@ -250,9 +250,9 @@ class KnownPoints:
         about, sets = {"name": "at", "settings": {}}, list[Points]()
         for method in dict.fromkeys(one.method for one in some):
             mine = [one for one in some if one.method == method]
-            old, new = [one for one in mine if one.row is not None], [one for one in mine if one.row is None]
+            old, new = {one.row: one.note for one in mine if one.row is not None}, [one for one in mine if one.row is None]
             if old:
-                sets.append(front[[one.row for one in old]].replace(notes=[one.note for one in old]))
+                sets.append(front[list(old)].replace(notes=list(old.values())))
             if new:
                 columns = {name: [one.columns.get(name) for one in new] for name in ("optimality", "costates", "weighted_gain")}
                 Z, notes = np.array([one.z for one in new]), [one.note for one in new]
