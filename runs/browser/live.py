@@ -28,7 +28,7 @@ from ..report.comparison import compared, comparisons
 from ..report.report import tables_across
 from .page import packed
 from .pages import cells_data, failures_data, measured_data, problem_name, read_front, run_data, solver_name, tables_data
-from .points import LIMITS, details, goals_data
+from .points import LIMITS, curve_data, details, goals_data
 
 SUFFIX = ".nc"
 T = TypeVar("T")
@@ -161,7 +161,7 @@ class FollowedFronts(Followed):
         """As `front_page` has it; of a folder with the names of the files in place of solvers."""
         labels = [solver_name(front) if self._single else path.stem for path, front in fronts.items()]
         runs = [
-            run_data(front, label, block=_block(path), version=stamps_of(path))
+            run_data(front, label, block=_block(path), version=stamps_of(path), curve=curve_data(front))
             for (path, front), label in zip(fronts.items(), labels, strict=True)
         ]
         ids = f"{name}, {', '.join(goal.name for goal in goals)}"

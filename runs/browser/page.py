@@ -20,8 +20,8 @@ import msgspec
 
 STATIC = Path(__file__).parent / "static"
 SCRIPTS = (
-    *("words.js", "state.js", "looks.js", "scatter.js", "parallel.js", "preferences.js", "point.js", "flight.js", "table.js"),
-    *("study.js", "main.js"),
+    *("words.js", "state.js", "looks.js", "scatter.js", "parallel.js", "preferences.js", "point.js", "flight.js", "along.js"),
+    *("table.js", "study.js", "main.js"),
 )
 """In the order in which they build on each other."""
 EMBEDDED, LIVE = "embedded.js", ("progress.js", "live.js")

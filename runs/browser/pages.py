@@ -24,7 +24,7 @@ from ..report.published import with_count
 from ..report.report import tables_across, tables_of
 from ..report.tables import Table
 from .page import packed, page, plotly
-from .points import about, columns, details, finite, goals_data, samples_of
+from .points import about, columns, curve_data, details, finite, goals_data, samples_of
 
 
 def write_page(source: str | PathLike[str], out: str | PathLike[str], *, trust: bool = False, progress: bool = False) -> Path:
@@ -47,7 +47,12 @@ def read_front(path: str | PathLike[str]) -> Front:
 def front_page(front: Front) -> bytes:
     """The page of a front: its data are those of a study with one comparison of one run."""
     name, solver = problem_name(front), solver_name(front)
-    comparison = {"name": name, "goals": goals_data(front.goals), "solvers": [solver], "runs": [run_data(front, solver, block="0")]}
+    comparison = {
+        "name": name,
+        "goals": goals_data(front.goals),
+        "solvers": [solver],
+        "runs": [run_data(front, solver, block="0", curve=curve_data(front))],
+    }
     data = {"title": name, "kind": "front", "comparisons": [comparison]}
     return page(data, {"0": packed(details(front, samples_of([front])))})
 

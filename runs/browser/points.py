@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from macs.front import Front
+from macs.fronts.curve import placed
 from macs.fronts.pictures.flight_plot import costate_ranges
 from macs.fronts.point import Point
 from macs.fronts.tables import footer, headline, parameters_of
@@ -81,6 +82,28 @@ def about(front: Front) -> dict[str, Any]:
     """The lines above and below the table of a front, and how much points may differ from their simulation."""
     below = footer(front) if len(front) else [front.message or "There is no point."]
     return {"headline": headline(front), "footer": below, "tolerance": front.stats.get("verify"), "dynamic": front.dynamic}
+
+
+def curve_data(front: Front, samples: int = 160) -> dict[str, Any] | None:
+    """The front as a curve: of each of its pieces places along it with the objectives there, and its points with theirs; None where slopes
+    are not known, or there are not two objectives."""
+    try:
+        curve = front.curve()
+    except ValueError:
+        return None
+    if not curve.rates_known:
+        return None
+    s, h = (one[:, None] for one in placed((front.F - curve.least) / curve.ranges))
+    pieces = []
+    for part in curve.parts:
+        own = np.isclose(part.places, s, rtol=0, atol=1e-9) & np.isclose(part.heights, h, rtol=0, atol=1e-9)
+        points, nodes = np.nonzero(own)
+        nodes, first = np.unique(nodes, return_index=True)
+        at, points = part.places[nodes], points[first]
+        places = np.union1d(part.spread(2 + int(samples * np.ptp(part.places))), at)
+        objectives = [finite(column) for column in curve.at_parameter(places).T]
+        pieces.append({"places": places.tolist(), "objectives": objectives, "points": points.tolist(), "at": at.tolist()})
+    return {"pieces": pieces, "error": curve.error}
 
 
 def finite(values: np.ndarray) -> list[float | None]:

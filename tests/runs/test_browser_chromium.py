@@ -10,9 +10,12 @@ import pytest
 from chromium import NEEDS_CHROMIUM, READY, errors, opened, wait, work_of
 from synthetic_fronts import black_box, flights, marked
 
+from macs import sweep
+from problems import load
 from runs.browser import page as pages
 from runs.browser.pages import front_page, run_data
 from runs.browser.points import details, differences, goals_data, samples_of
+from transcription import parse
 
 pytest.importorskip("plotly")
 webdriver = pytest.importorskip("selenium.webdriver")
@@ -80,6 +83,78 @@ def test_numbers_are_those_of_the_table_and_details_are_shown_on_demand(browser,
     assert "defect" in browser.execute_script(heads) and browser.execute_script(
         "return byId('table-details').querySelector('input').checked"
     )
+    assert errors(browser) == []
+
+
+SLID = """
+const range = byId('along-range'), done = arguments[1];
+range.value = arguments[0];
+range.dispatchEvent(new Event('input'));
+requestAnimationFrame(() => setTimeout(() => done(range.getAttribute('aria-valuetext')), 50));
+"""
+"""Move the slider; returns what it says."""
+MOVING = (
+    "const [one] = panels.filter(({ quantity }) => quantity.name === arguments[0]); return one.traces.find(({ meta }) => meta !== null)"
+)
+"""The interpolated trace of the panel of a quantity."""
+WORK = """
+const took = [];
+for (slide.place = 10; slide.place < 40; slide.place += 1) {
+  const began = performance.now();
+  redrawAlong();
+  document.body.offsetHeight; // the page is laid out
+  took.push(performance.now() - began);
+}
+return took.sort((a, b) => a - b)[15];
+"""
+"""Milliseconds of work for a redraw, the median of 30."""
+
+
+def test_a_slider_moves_along_the_front_with_interpolated_trajectories(browser, tmp_path):
+    from selenium.webdriver.common.keys import Keys
+
+    whole = sweep(load("goddard"), parse("dfet:4x6:bernstein"), points=10, starts=1)
+    front, between = whole[[k for k in range(10) if k != 5]], whole[5]
+    show(browser, tmp_path, front_page(front))
+    places = browser.execute_script("return slide.places.map(({ values }) => values[0])")
+    place = int(np.argmin(np.abs(np.array(places) - between.objectives["flight time"])))
+    said = browser.execute_async_script(SLID, place)
+    assert said.startswith(f"flight time {places[place]:.1f} s, horizontal speed 0.") and said.endswith("km/s, interpolated")
+    wait(browser, "panels.some(({ traces }) => traces.some(({ meta }) => meta !== null))")
+    for name, values in between.trajectory["ascent"].at(np.linspace(0.0, between.trajectory["ascent"].tf, 50)).items():
+        trace = browser.execute_script(MOVING, name)
+        times, found = np.array(trace["x"]), np.array(trace["y"])
+        assert times[-1] == pytest.approx(places[place], rel=2e-3)
+        spread = np.ptp([one.trajectory["ascent"][name] for one in front], axis=None)
+        assert np.abs(np.interp(np.linspace(0.0, times[-1], 50), times, found) - values).max() < 0.02 * spread, name
+    note = browser.execute_script("return byId('along-note').textContent")
+    assert note.startswith('Between points 4 and 5, interpolated, not simulated; front.at({"flight time": ')
+    assert browser.execute_script("return byId('plot').data.find(({ meta }) => meta === 'curve').x.length") == len(places) + 1
+    browser.execute_script("byId('along-range').focus()")
+    webdriver.ActionChains(browser).send_keys(Keys.END).perform()
+    wait(browser, "byId('along-range').getAttribute('aria-valuetext').startsWith('Point 8: ')")
+    webdriver.ActionChains(browser).send_keys(Keys.ARROW_LEFT).perform()
+    wait(browser, "byId('along-range').getAttribute('aria-valuetext').endsWith('interpolated')")
+    wait(browser, "byId('plot').data.find(({ meta }) => meta === 'along').x[0] === placeShown().values[0]")
+    assert browser.execute_script("return panels.length") >= 8 and browser.execute_script(WORK) < 50
+    # Two valleys: between them nothing is interpolated.
+    parts = """
+    const [{ places, objectives, points, at }] = slide.run.curve.pieces;
+    const cut = places.findIndex((one) => one > 0.5 * (at[3] + at[4]));
+    const piece = (i, j, a, b) => ({ places: places.slice(i, j), objectives: objectives.map((one) => one.slice(i, j)), points: points.slice(a, b), at: at.slice(a, b) });
+    slide.run.curve.pieces = [piece(0, cut, 0, 4), piece(cut, places.length, 4, 9)];
+    slide.run = null;
+    endSlide();
+    return cut;
+    """
+    cut = browser.execute_script(parts)
+    assert not browser.execute_async_script(SLID, cut).endswith("interpolated")
+    assert "that of point 4, the nearest" in browser.execute_script("return byId('along-note').textContent")
+    browser.execute_script("select(state.points[2].key)")
+    assert browser.execute_script("return [slide.place, byId('along-range').getAttribute('aria-valuetext').slice(0, 8)]") == [
+        None,
+        "Point 2:",
+    ]
     assert errors(browser) == []
 
 

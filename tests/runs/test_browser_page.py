@@ -16,6 +16,7 @@ from synthetic_fronts import black_box, flights, marked, with_optional_phase
 from test_study import Inline
 
 from macs import optimize
+from macs.fronts.curve import GAPS
 from problems import load
 from problems.compiled import Objective
 from runs import Study
@@ -25,6 +26,7 @@ from runs.browser.pages import front_page, study_page
 from runs.browser.points import LIMITS, curves, differences, thinned
 from runs.cli import main
 from transcription import parse
+from transcription.trajectories.costates import Costates
 
 pytest.importorskip("plotly")
 
@@ -122,6 +124,20 @@ def test_costates_are_those_of_the_point_and_have_units():
     assert max(one["least"] for one in adjoint) < 1.0
     whole = curves(*with_optional_phase(1.0), 400)[1]
     assert whole["lasts"] and {one["kind"] for one in whole["quantities"]} == {"state", "costate", "hamiltonian"}
+
+
+def test_a_front_with_slopes_is_a_curve_through_its_points_and_has_its_gaps():
+    weights = np.column_stack([np.cos(angles := np.linspace(0.0, np.pi / 2, 8)), np.sin(angles)])
+    costates = [Costates(one / one.sum(), {}) for one in weights]
+    front = black_box(8, F=1.0 - weights, costates=costates, stats={GAPS: [(1.0 - weights[3:5, 0]).tolist()]})
+    curve = Reader(front_page(front)).data["comparisons"][0]["runs"][0]["curve"]
+    assert [piece["points"] for piece in curve["pieces"]] == [[0, 1, 2, 3], [4, 5, 6, 7]] and curve["error"] < 0.01
+    for piece in curve["pieces"]:
+        objectives = np.array(piece["objectives"])
+        assert np.hypot(*(1.0 - objectives)) == pytest.approx(1.0, abs=1e-4) and len(piece["places"]) > 30
+        own = [piece["places"].index(one) for one in piece["at"]]
+        assert pytest.approx(front.objectives[piece["points"]]) == objectives[:, own].T
+    assert Reader(front_page(black_box(8))).data["comparisons"][0]["runs"][0]["curve"] is None
 
 
 def test_a_page_loads_nothing_and_stays_small():

@@ -30,14 +30,20 @@ async function showFlights() {
     return;
   }
   if (mine !== drawing) return;
-  const flights = loadedFlights.filter(({ detail }) => detail.phases.length);
+  const flights = loadedFlights.filter(({ detail }) => detail.phases.length).map(({ point, detail }) => ({ key: point.key, name: pointName(point), words: inWords(point), detail }));
+  let all = [];
+  if (slide.place !== null && flights.length) {
+    all = (await details(curveRun())).filter((detail) => detail.phases.length);
+    if (mine !== drawing) return;
+    flights.push(flightAlong(all));
+  }
   if (!flights.length) {
     clearPanels();
     fill(byId("flights-note"), "The point has no trajectory.");
     return;
   }
   fill(byId("flights-note"), ...flightsNote(flights));
-  drawPanels(flights);
+  drawPanels(flights, all);
 }
 
 /** Where no point has a trajectory, there is no place for them either. */
@@ -53,9 +59,9 @@ function clearPanels() {
 
 /** Which colour is which point, and what lines mean. */
 function flightsNote(flights) {
-  const names = flights.flatMap(({ point }, k) => [
-    element("span", { class: "swatch", style: `color: ${colorOf(k)}`, "aria-hidden": "true" }, k % 2 ? "\u254D" : "\u2501"),
-    ` ${pointName(point)}: ${inWords(point)}`,
+  const names = flights.flatMap(({ name, words, along }, k) => [
+    element("span", { class: "swatch", style: `color: ${along ? ALONG : colorOf(k)}`, "aria-hidden": "true" }, along ? "\u254C" : k % 2 ? "\u254D" : "\u2501"),
+    element("span", { id: along ? "flight-along" : null }, ` ${name}: ${words}`),
     element("br"),
   ]);
   const phases = flights[0].detail.phases.map((phase) => phase.name);
@@ -83,45 +89,55 @@ function groups(flights) {
     .map((title) => [title, [...found.get(title).values()]]);
 }
 
-function drawPanels(flights) {
+function drawPanels(flights, all) {
   const place = byId("flights-plot");
   clearPanels();
+  panels = [];
   if (!canDraw()) return;
   for (const [title, quantities] of groups(flights)) {
     const grid = element("div", { class: "panels" });
     place.append(element("h3", {}, title), grid);
     for (const quantity of quantities) {
-      const figure = panelFigure(flights, quantity);
+      const figure = panelFigure(flights, quantity, all);
       const plot = element("div", { class: "panel-plot", role: "img", "aria-label": figure.words });
       grid.append(element("div", { class: "panel" }, element("p", { class: "panel-title" }, figure.title, " ", element("span", { class: "note" }, figure.limits)), plot));
+      panels.push({ plot, quantity, traces: figure.traces });
       drawWhenSeen(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
     }
   }
-  byId("flights").dataset.drawn = flights.map(({ point }) => point.key).join(" "); // for tests and style sheets
+  byId("flights").dataset.drawn = flights.flatMap(({ key }) => key ?? []).join(" "); // for tests and style sheets
 }
 
-/** Everything of a panel: its traces, layout, title, limits as text, and the same in words. */
-function panelFigure(flights, { name, kind, unit }) {
+let panels = []; // those that are there: the place, the quantity and the traces of each
+
+/** Everything of a panel: its traces, layout, title, limits as text, and the same in words. Its axes have room for `all` flights. */
+function panelFigure(flights, { name, kind, unit }, all) {
   const traces = [], limits = [], shapes = [];
   let least = 0;
-  flights.forEach(({ point, detail }, k) => {
+  flights.forEach(({ name: flight, detail, along }, k) => {
     detail.phases.forEach((phase, p) => {
       const own = phase.quantities.find((one) => one.name === name && one.kind === kind);
       if (p > 0 && k === 0) shapes.push(endOfPhase(phase.t0));
       if (!own) return;
       least = Math.max(least, own.least);
-      limits.push({ phase, lower: own.lower, upper: own.upper });
+      limits.push({ phase: along ? longest(phase, all) : phase, lower: own.lower, upper: own.upper });
       traces.push({
         x: curveValues(phase.times[own.t]),
         y: curveValues(own.v),
         mode: "lines",
-        line: { color: colorOf(k), width: WIDTHS[k], dash: k % 2 ? "dash" : "solid" },
-        name: plotText(pointName(point)),
-        hovertemplate: `%{y:.6~g} at %{x:.6~g}<extra>${plotText(pointName(point)).replace(/[{}%]/g, "")}</extra>`,
+        line: along ? { color: ALONG, width: 2, dash: "4px,2px" } : { color: colorOf(k), width: WIDTHS[k], dash: k % 2 ? "dash" : "solid" },
+        name: plotText(flight),
+        meta: along ? p : null, // the number of the phase of a flight that moves
+        hovertemplate: `%{y:.6~g} at %{x:.6~g}<extra>${plotText(flight).replace(/[{}%]/g, "")}</extra>`,
       });
     });
   });
   const values = traces.flatMap((trace) => trace.y).filter((value) => value !== null);
+  const ends = all.flatMap(({ phases }) => phases.flatMap(({ quantities }) => quantities.filter((one) => one.name === name && one.kind === kind)));
+  const others = ends.map((one) => extent(curveValues(one.v)));
+  // Costates may be huge at the ends of a front, where the weight of an objective is zero.
+  const left = kind === "costate" || kind === "hamiltonian" ? Math.ceil(others.length / 10) : 0;
+  for (const i of [0, 1]) values.push(...others.map((one) => one[i]).sort((a, b) => a - b).slice(left, others.length - left));
   let [low, high] = extent(values);
   const words = [...new Set(limits.map((one) => limitsText(one.lower, one.upper)).filter(Boolean))].join("; ");
   const spans = limits.map((one) => one.upper - one.lower).filter(Number.isFinite);
@@ -142,7 +158,7 @@ function panelFigure(flights, { name, kind, unit }) {
   }
   for (const { y0, layer } of shapes) if (layer === "below" && y0 !== undefined) [low, high] = [Math.min(low, y0), Math.max(high, y0)];
   const margin = 0.07 * (high - low);
-  const phases = flights.flatMap(({ detail }) => detail.phases);
+  const phases = [...flights.map(({ detail }) => detail), ...all].flatMap((detail) => detail.phases);
   const [first, last] = extent(phases.flatMap((phase) => [phase.t0, phase.tf]));
   const [over, units] = ["over", "unit"].map((key) => [...new Set(limits.map((one) => one.phase[key]))].join(" | "));
   return {
@@ -161,8 +177,21 @@ function panelFigure(flights, { name, kind, unit }) {
   };
 }
 
+/** A phase of a moving flight, as long as it is in any of some flights. */
+const longest = (phase, all) => {
+  const same = all.flatMap(({ phases }) => phases.filter(({ name }) => name === phase.name));
+  return { ...phase, t0: Math.min(...same.map(({ t0 }) => t0)), tf: Math.max(...same.map(({ tf }) => tf)) };
+};
+
+const summedUp = new WeakMap();
+
 /** The values of a curve from the number of its decimals and its third differences; null in gaps. */
-function curveValues([decimals, ...differences]) {
+function curveValues(told) {
+  if (!summedUp.has(told)) summedUp.set(told, summed(told));
+  return summedUp.get(told);
+}
+
+function summed([decimals, ...differences]) {
   const unit = Number(`1e${Math.abs(decimals)}`);
   let value = 0, slope = 0, bend = 0;
   return differences.map((step) => {

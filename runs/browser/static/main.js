@@ -19,6 +19,7 @@ function begin() {
   on("filter", () => {
     showPreferences();
     announceWanted();
+    showAlong();
     drawFront();
     showTable();
   });
@@ -26,6 +27,8 @@ function begin() {
     const point = selectedPoint();
     if (point) announce(`${pointName(point)} selected: ${inWords(point)}; ${statusOf(point)}`);
     markRow();
+    if (slide.key !== state.selected) endSlide();
+    slide.key = state.selected;
     drawFront();
     showPoint();
     showFlights();
@@ -34,6 +37,7 @@ function begin() {
     if (axesShown !== axesPossible()) rebuilt(byId("views"), buildViews);
     rebuilt(byId("choices"), buildChoices);
     renewPreferences();
+    if (slide.run && !state.points.some(({ run }) => run === slide.run)) endSlide();
     drawFront();
     rebuilt(byId("table"), showTable);
     if (!selectedPoint()) showPoint();
@@ -53,6 +57,8 @@ function drawFigures() {
 }
 
 function refresh() {
+  slide.key = state.selected;
+  endSlide();
   drawFront();
   showTable();
   showPoint();

@@ -113,7 +113,8 @@ function drawTwo(place) {
   const { goals } = state.comparison;
   const { x, y } = view;
   const type = shownPoints().length > MANY && hasGl() ? "scattergl" : "scatter";
-  const traces = [...referenceTraces(x, y), ...goingTraces({ x, y }, "scatter", false), ...pointTraces({ x, y }, type, false)];
+  const traces = [...referenceTraces(x, y), ...curveTraces(x, y), ...goingTraces({ x, y }, "scatter", false), ...pointTraces({ x, y }, type, false)];
+  if (traces.some(({ meta }) => meta === "curve")) traces.push(alongTrace(x, y));
   const figure = layout({
     height: 440,
     // Where somebody has zoomed in, that stays as long as the axes are the same.
