@@ -93,9 +93,10 @@ range.dispatchEvent(new Event('input'));
 requestAnimationFrame(() => setTimeout(() => done(range.getAttribute('aria-valuetext')), 50));
 """
 """Move the slider; returns what it says."""
-MOVING = (
-    "const [one] = panels.filter(({ quantity }) => quantity.name === arguments[0]); return one.traces.find(({ meta }) => meta !== null)"
-)
+MOVING = """
+const [{ traces }] = panels.filter(({ quantity }) => quantity.name === arguments[0]);
+return traces.find(({ meta }) => meta !== null);
+"""
 """The interpolated trace of the panel of a quantity."""
 WORK = """
 const took = [];
@@ -126,7 +127,9 @@ def test_a_slider_moves_along_the_front_with_interpolated_trajectories(browser, 
         times, found = np.array(trace["x"]), np.array(trace["y"])
         assert times[-1] == pytest.approx(places[place], rel=2e-3)
         spread = np.ptp([one.trajectory["ascent"][name] for one in front], axis=None)
-        assert np.abs(np.interp(np.linspace(0.0, times[-1], 50), times, found) - values).max() < 0.02 * spread, name
+        assert np.abs(np.interp(np.linspace(0.0, times[-1], 50), times, found) - values).max() < 0.005 * spread, (
+            name
+        )  # straight lines between two points: 0.009
     note = browser.execute_script("return byId('along-note').textContent")
     assert note.startswith('Between points 4 and 5, interpolated, not simulated; front.at({"flight time": ')
     assert browser.execute_script("return byId('plot').data.find(({ meta }) => meta === 'curve').x.length") == len(places) + 1
@@ -141,8 +144,10 @@ def test_a_slider_moves_along_the_front_with_interpolated_trajectories(browser, 
     parts = """
     const [{ places, objectives, points, at }] = slide.run.curve.pieces;
     const cut = places.findIndex((one) => one > 0.5 * (at[3] + at[4]));
-    const piece = (i, j, a, b) => ({ places: places.slice(i, j), objectives: objectives.map((one) => one.slice(i, j)), points: points.slice(a, b), at: at.slice(a, b) });
-    slide.run.curve.pieces = [piece(0, cut, 0, 4), piece(cut, places.length, 4, 9)];
+    slide.run.curve.pieces = [[0, cut, 0, 4], [cut, places.length, 4, 9]].map(([i, j, first, end]) => {
+      const [own, across, up] = [places, ...objectives].map((list) => list.slice(i, j));
+      return { places: own, objectives: [across, up], points: points.slice(first, end), at: at.slice(first, end) };
+    });
     slide.run = null;
     endSlide();
     return cut;
@@ -151,10 +156,9 @@ def test_a_slider_moves_along_the_front_with_interpolated_trajectories(browser, 
     assert not browser.execute_async_script(SLID, cut).endswith("interpolated")
     assert "that of point 4, the nearest" in browser.execute_script("return byId('along-note').textContent")
     browser.execute_script("select(state.points[2].key)")
-    assert browser.execute_script("return [slide.place, byId('along-range').getAttribute('aria-valuetext').slice(0, 8)]") == [
-        None,
-        "Point 2:",
-    ]
+    assert browser.execute_script("return slide.place === null && byId('along-range').getAttribute('aria-valuetext')").startswith(
+        "Point 2:"
+    )
     assert errors(browser) == []
 
 
