@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,7 +16,7 @@ from problems.vector import SAMPLED, CompiledVectorProblem, filled, is_of_statem
 from transcription.stopping import Stopped
 from transcription.trajectories.limits import excess
 
-from ..io.interrupts import at_once
+from ..io.interrupts import at_once, work_on_trajectories
 from ..io.workers import each
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator, masks
 
@@ -44,7 +45,10 @@ class BlackBox(Evaluator):
         self.free = np.arange(len(problem.variables))
         self.kinds = masks(problem.variables)
         self.known_designs: dict[bytes, np.ndarray] = {}
-        self.apart = apart or problem.by_row  # whether each row is evaluated by itself
+        self.apart, self._alike = (
+            apart or problem.by_row,
+            apart,
+        )  # whether rows are evaluated by themselves, with one thread as in processes
         self._columns: Sequence[int] = (len(problem.goals), len(problem.limits)) if problem.goals and problem.limits is not None else ()
         self._why: dict[int, str] = {}  # of the last batch, why rows failed
         self._failing = 0  # evaluations that failed since the last one that did not
@@ -101,7 +105,7 @@ class BlackBox(Evaluator):
         """See `CompiledVectorProblem.evaluate`; of a batch in which an error was raised each row by itself, NaN where it is raised again.
         Ctrl-C that the function hears ends the search."""
         try:
-            with at_once():
+            with at_once(), work_on_trajectories() if self._alike else nullcontext():
                 try:
                     found: list[Any] = [] if self.apart else [self.problem.evaluate(Z)]
                 except Exception as error:

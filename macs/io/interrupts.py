@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from contextvars import ContextVar
+from functools import lru_cache
 from types import FrameType, TracebackType
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_by
 
@@ -128,5 +130,11 @@ def purpose() -> str:
 def work_on_trajectories() -> Iterator[None]:
     """A context of work on trajectories. Some are far from feasible: statuses and violations say what is no number there, and warnings of
     numpy would add nothing. Matrices are small: more threads of BLAS than one would cost time, and make last digits those of a machine."""
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), threadpool_limits(1, user_api="blas"):
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"), _libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
         yield
+
+
+@lru_cache(maxsize=1)
+def _libraries(modules: int) -> ThreadpoolController:
+    """The libraries that were loaded with so many modules; to look for them takes some milliseconds."""
+    return ThreadpoolController()

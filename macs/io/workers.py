@@ -104,21 +104,37 @@ class Helpers:
         found, left, begun = dict[int, Future[Any]](), deque(range(len(pieces))), dict[Future[Any], int]()
         data = self._packed(do, shared) if self._worth else b""
         digest, stop = hashlib.sha256(data).hexdigest(), Path(tempfile.gettempdir()) / f"macs-{uuid.uuid4().hex}"
+        lock, ready = threading.RLock(), 0
+
+        def feed(done: Future[Any] | None = None) -> None:
+            """Give pieces to the processes that are ready: one each, and a next one as long as many are left; again as soon as one is done,
+            since this process may be at work on a long piece. Else it takes one itself."""
+            with lock:
+                if done is not None and (done.cancelled() or done.exception() is not None):
+                    return
+                while len(left) > (done is None and not self._given):
+                    if sum(not one.done() for one in begun) >= ready * (2 if len(left) > 2 * self._count else 1):
+                        break
+                    k = left.popleft()
+                    future = self._submit(_perform, digest, data, pieces[k], str(stop))
+                    begun[future] = k
+                    future.add_done_callback(feed)
+
         try:
             while left or begun:
-                room = self._room(len(left), digest, data)
-                while left and len(begun) < room and (self._given or len(left) > 1):
-                    k = left.popleft()
-                    begun[self._submit(_perform, digest, data, pieces[k], str(stop))] = k
-                if left:
-                    k = left.pop()
-                    found[k] = self._here(do, shared, pieces[k])
+                ready = self._ready(len(left), digest, data)
+                feed()
+                with lock:
+                    mine = left.pop() if left else None
+                if mine is not None:
+                    found[mine] = self._here(do, shared, pieces[mine])
                 else:
                     wait(begun, timeout=0.1, return_when=FIRST_COMPLETED)
                 if begun and stopping():
                     stop.touch()
-                for future in [one for one in begun if one.done()]:
-                    k = begun.pop(future)
+                with lock:
+                    ended = {one: begun.pop(one) for one in [*begun] if one.done()}
+                for future, k in ended.items():
                     if self._lost(future):
                         left.append(k)
                     else:
@@ -126,6 +142,7 @@ class Helpers:
                 if any(one.exception() is not None for one in found.values()):
                     left.clear()  # as with one process, in which no piece after it would begin
         except BaseException:
+            left.clear()
             stop.touch()
             for future in begun:
                 future.cancel()
@@ -153,9 +170,8 @@ class Helpers:
             _alone(str(error).rsplit("\n", 1)[-1])
             return b""
 
-    def _room(self, left: int, digest: str, data: bytes) -> int:
-        """Most pieces that others may have at a time: one for each, and a next one as long as many are left. They learn what a piece needs
-        while this process works."""
+    def _ready(self, left: int, digest: str, data: bytes) -> int:
+        """How many processes may have pieces. They learn what a piece needs while this process works."""
         if self._given:
             return left
         if not self._worth or not data:
@@ -168,7 +184,7 @@ class Helpers:
         if wrong := [error for error in outcomes if error is not None and not isinstance(error, BrokenProcessPool)]:
             _alone(str(wrong[0]).rsplit("\n", 1)[-1])
             return 0
-        return outcomes.count(None) * (2 if left > 2 * self._count else 1)
+        return outcomes.count(None)
 
     def _here(self, do: Callable[..., Any], shared: Any, piece: tuple[Any, ...]) -> Future[Any]:
         """What a piece gives in this process."""

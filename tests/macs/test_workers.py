@@ -48,6 +48,21 @@ def test_results_have_the_order_of_pieces_wherever_they_are_done(eager):
                 each(divmod, 100, [(k,) for k in (3, 0, 5, "seven", 0)])
 
 
+def test_others_get_further_pieces_while_this_process_is_at_work_on_one(eager, tmp_path):
+    here = os.getpid()
+
+    def piece(folder, k, count):
+        (folder / str(k)).touch()
+        for _ in until(lambda: os.getpid() != here or k == 0 or len(list(folder.iterdir())) == count):
+            time.sleep(0.01)
+        return os.getpid()
+
+    with processes(2):
+        for _ in until(lambda: len(set(each(piece, tmp_path, [(k, 0) for k in (0, 0)]))) == 2):
+            pass
+        assert each(piece, tmp_path, [(k, 6) for k in range(6)]).count(here) == 1
+
+
 def test_what_cannot_be_sent_to_other_processes_stays_in_this_one(eager, caplog):
     with caplog.at_level(logging.WARNING), processes(2):
         for _ in range(3):
