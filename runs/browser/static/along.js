@@ -9,8 +9,12 @@ const slide = { place: null, run: null, frame: 0, rest: 0 }; // number of the pl
 /** The run whose front is drawn as a curve: that of the selected point. */
 const curveRun = () => (selectedPoint()?.run.curve ? selectedPoint().run : null);
 
-/** All places of a run's curve, one piece after the other: gaps are passed over. */
-const placesOf = (run) => run.curve.pieces.flatMap((piece) => piece.places.map((s, k) => ({ s, piece, values: piece.objectives.map((one) => one[k]) })));
+/** All places of a run's curve, one piece after the other, from the least value of the first objective: gaps are passed over. */
+function placesOf(run) {
+  const all = run.curve.pieces.flatMap((piece) => piece.places.map((s, k) => ({ s, piece, values: piece.objectives.map((one) => one[k]) })));
+  return all[0].values[0] > all.at(-1).values[0] ? all.reverse() : all;
+}
+
 const placeShown = () => (slide.place === null ? null : slide.places[slide.place]);
 
 /** Build the slider, at the selected point. */
@@ -58,7 +62,7 @@ function sharesAt({ s, piece: { at, points } }) {
   }
   let shares = weightsAt(s, at, [k - 2, k - 1, k, k + 1].filter((i) => i in at));
   if (shares.reduce((sum, [, weight]) => sum + Math.abs(weight), 0) > FEW_WEIGHTS) shares = weightsAt(s, at, [k - 1, k]);
-  return { between: [points[k - 1], points[k]], shares: shares.map(([i, weight]) => [points[i], weight]) };
+  return { between: [points[k - 1], points[k]].sort((a, b) => a - b), shares: shares.map(([i, weight]) => [points[i], weight]) };
 }
 
 /** Weights of the polynomial through values at some places. */
@@ -131,8 +135,9 @@ function mixedPhases(shares) {
       const tau = shares01[one.t];
       const sum = new Array(tau.length).fill(0);
       for (const [other, quantity, weight] of found) addInterpolated(sum, tau, curveValues(other.times[quantity.t]).map(from(other)), curveValues(quantity.v), weight);
-      const { lower, upper } = one;
-      return { ...one, v: plain(sum.map((value) => Math.min(Math.max(value, lower ?? -Infinity), upper ?? Infinity))) };
+      const ends = found.map(([, { v }]) => extent(curveValues(v)));
+      const low = Math.min(one.lower ?? -Infinity, ...ends.map(([least]) => least)), high = Math.max(one.upper ?? Infinity, ...ends.map(([, most]) => most));
+      return { ...one, v: plain(sum.map((value) => Math.min(Math.max(value, low), high))) };
     });
     return { ...phase, t0, tf, times, quantities };
   });
@@ -161,22 +166,24 @@ function redrawAlong() {
   wordsAlong();
   if (!canDraw()) return;
   const { values } = placeShown();
-  const plot = byId("plot");
-  const marker = plot.data?.findIndex(({ meta }) => meta === "along") ?? -1;
-  const moved = [[plot, marker < 0 ? [] : [marker], [[values[view.x]]], [[values[view.y]]]]];
+  const moved = [[byId("plot"), markers, [[values[view.x]]], [[values[view.y]]]]];
   if (slide.all) {
     const { phases } = flightAlong(slide.all).detail;
     moved.push(...panels.map((panel) => movedTraces(panel, phases)));
   }
-  moved.forEach(([place, traces, x, y]) => traces.forEach((trace, k) => moveTrace(place, trace, x[k], y[k])));
+  moved.forEach(([place, traces, x, y]) => traces().forEach((trace, k) => moveTrace(place, trace, x[k], y[k])));
   clearTimeout(slide.rest);
   const settle = () => {
     const [place, traces, x, y] = moved.shift();
-    if (traces.length && pending.has(place)) Plotly.restyle(place, { x, y }, traces);
+    // Meanwhile it may have been given up, or drawn with other points.
+    if (place.isConnected && pending.has(place) && traces().length) Plotly.restyle(place, { x, y }, traces());
     if (moved.length) slide.rest = setTimeout(settle);
   };
   slide.rest = setTimeout(settle, 200);
 }
+
+/** The number of the marker among the traces of the figure of the front, in a list; empty in figures without it. */
+const markers = () => [byId("plot").data?.findIndex(({ meta }) => meta === "along") ?? -1].filter((i) => i >= 0);
 
 /** The place of a panel, its traces that move, and their new coordinates. */
 function movedTraces({ plot, quantity: { name, kind }, traces }, phases) {
@@ -184,7 +191,7 @@ function movedTraces({ plot, quantity: { name, kind }, traces }, phases) {
   const places = [...traces.keys()].filter((i) => owns[i]);
   const x = places.map((i) => curveValues(phases[traces[i].meta].times[owns[i].t])), y = places.map((i) => curveValues(owns[i].v));
   if (!pending.has(plot)) places.forEach((i, k) => Object.assign(traces[i], { x: x[k], y: y[k] })); // it is drawn later
-  return [plot, places, x, y];
+  return [plot, () => places, x, y];
 }
 
 /** Move a line or a marker on the page itself, to coordinates of its axes. */
