@@ -223,12 +223,13 @@ class External:
     def __init__(
         self, function: Callable[..., Any], name: str, inputs: list[str], counts: list[int], derivatives: str | Callable[..., Any]
     ) -> None:
-        self.function, self.name, self.inputs, self.counts, self.derivatives = function, name, inputs, counts, derivatives
+        self.function, self.name, self.inputs, self.derivatives = function, name, inputs, derivatives
         self.outputs: list[str] = []
         self.one_row, self.checked = False, False
         self.noise, self.spans = float(np.finfo(float).eps), np.ones(len(inputs))
         self._made: dict[tuple[int, int], ExternalPoints] = {}  # by order of derivatives and number of points
-        self._last: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._columns = [slice(end - count, end) for count, end in zip(counts, np.cumsum(counts), strict=True)]
+        self._last: dict[tuple[int, bytes], np.ndarray] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_made": {}, "_last": {}}
@@ -250,13 +251,18 @@ class External:
 
     def evaluate(self, order: int, X: np.ndarray) -> np.ndarray:
         """Derivatives of an order (k, size) at points (k, inputs), each as a column-major matrix of those of the order before."""
-        last = self._last.get(order)
-        if last is None or not np.array_equal(last[0], X):
+        # Solvers ask for values, first and second derivatives at the same points, one after the other, in shooting at a row at a time.
+        key = order, X.tobytes()
+        known = self._last.pop(key, None)
+        if known is None:
             k, n = X.shape
             some = max(1, 100_000 // n**order)  # rows in memory at once
             found = [(self.values, self.jacobian, self.hessian)[order](X[first : first + some]) for first in range(0, k, some)]
-            last = self._last[order] = X, np.concatenate(found).reshape(k, -1)
-        return last[1]
+            known = np.concatenate(found).reshape(k, -1)
+        self._last[key] = known
+        while len(self._last) > max(3, 10_000 // max(known.size, 1)):
+            del self._last[next(iter(self._last))]
+        return known
 
     def values(self, X: np.ndarray) -> np.ndarray:
         """What the function returns, (k, outputs)."""
@@ -378,7 +384,7 @@ class External:
 
     def _called(self, function: Callable[..., Any], X: np.ndarray) -> np.ndarray:
         """A function of the user's at points: arrays, or, where it takes one, row by row."""
-        parts = np.split(X[:, :-1], np.cumsum(self.counts)[:2], axis=1)
+        parts = [X[:, columns] for columns in self._columns]
         try:
             with np.errstate(all="ignore"):
                 if not self.one_row:

@@ -76,6 +76,16 @@ def test_all_transcriptions_take_externals(method):
     assert one == pytest.approx(other, abs=1e-8)
 
 
+def test_values_at_the_points_of_a_shot_are_not_computed_again_for_its_derivatives():
+    nlp = SingleShooting(6).nlp(ascent(rates).compile())
+    z = np.random.default_rng(0).uniform(nlp.lower, nlp.upper)
+    calls.clear()
+    nlp.functions(z)
+    values = len(calls)
+    nlp.functions.jacobian()(z, *([0] * 2))
+    assert len(calls) == 2 * values > 0
+
+
 def test_derivatives_to_the_second_order():
     def function(s, c, p, t):
         return np.stack([np.sin(s[:, 0]) * c[:, 0], t * p[:, 0] ** 2], axis=-1)
