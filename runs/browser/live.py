@@ -119,6 +119,14 @@ def _line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
+@dataclass(frozen=True)
+class Shown:
+    """A front, and its data on the page."""
+
+    front: Front
+    data: msgspec.Raw
+
+
 class FollowedFronts(Followed):
     """One front, or all fronts of a folder, compared where they are of the same problem."""
 
@@ -133,23 +141,23 @@ class FollowedFronts(Followed):
 
     def look(self) -> Mapping[str, Any]:
         """See `Followed`."""
-        fronts: dict[Path, Front] = {}
+        found: dict[Path, Shown] = {}
         unreadable = []
         for path in self._files():
             try:
-                fronts[path] = self._readings.of(lambda path=path: read_front(path), path)  # type: ignore[misc]
+                found[path] = self._readings.of(lambda path=path: self._show(path), path)  # type: ignore[misc]
             except (ValueError, OSError) as error:
                 if self._single:
                     raise
                 unreadable.append(f"{path.name} cannot be read now: {_line(error)}")
         self._readings.forget()
-        groups: dict[Any, dict[Path, Front]] = {}
-        for path, front in fronts.items():
-            groups.setdefault((problem_name(front), tuple(front.goals)), {})[path] = front
+        groups: dict[Any, dict[Path, Shown]] = {}
+        for path, one in found.items():
+            groups.setdefault((problem_name(one.front), tuple(one.front.goals)), {})[path] = one
         shown = [self._comparison(name, goals, ones) for (name, goals), ones in groups.items()]
         title, kind = (shown[0]["name"], "front") if self._single else (self.title, "fronts")
         self.answers["data"] = Answer.of({"title": title, "kind": kind, "comparisons": shown, "unreadable": unreadable})
-        self.fronts = {_block(path): front for path, front in fronts.items()}
+        self.fronts = {_block(path): one.front for path, one in found.items()}
         return {}
 
     def _files(self) -> list[Path]:
@@ -157,15 +165,20 @@ class FollowedFronts(Followed):
             return [self._path]
         return sorted(path for path in self._path.iterdir() if path.suffix == SUFFIX and not path.name.startswith("."))
 
-    def _comparison(self, name: str, goals: Sequence[Objective], fronts: Mapping[Path, Front]) -> dict[str, Any]:
-        """As `front_page` has it; of a folder with the names of the files in place of solvers."""
-        labels = [solver_name(front) if self._single else path.stem for path, front in fronts.items()]
-        runs = [
-            run_data(front, label, block=_block(path), version=stamps_of(path), curve=curve_data(front))
-            for (path, front), label in zip(fronts.items(), labels, strict=True)
-        ]
+    def _label(self, path: Path, front: Front) -> str:
+        """The name of the solver; of a folder that of the file in its place."""
+        return solver_name(front) if self._single else path.stem
+
+    def _show(self, path: Path) -> Shown:
+        version, front = stamps_of(path), read_front(path)  # what changes meanwhile is read again
+        data = run_data(front, self._label(path, front), block=_block(path), version=version, curve=curve_data(front))
+        return Shown(front, msgspec.Raw(msgspec.json.encode(data)))
+
+    def _comparison(self, name: str, goals: Sequence[Objective], shown: Mapping[Path, Shown]) -> dict[str, Any]:
+        """As `front_page` has it."""
+        labels = [self._label(path, one.front) for path, one in shown.items()]
         ids = f"{name}, {', '.join(goal.name for goal in goals)}"
-        return {"id": ids, "name": name, "goals": goals_data(goals), "solvers": labels, "runs": runs}
+        return {"id": ids, "name": name, "goals": goals_data(goals), "solvers": labels, "runs": [one.data for one in shown.values()]}
 
 
 def _block(path: Path) -> str:
@@ -189,14 +202,6 @@ class FollowedStore(Store):
         """One run."""
         front = self.front_path(cell, number)
         return self.readings.of(lambda: super(FollowedStore, self).run(cell, number), front, front.with_suffix(".json"))
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A finished run: its front, and its data on the page."""
-
-    front: Front
-    data: msgspec.Raw
 
 
 Key = tuple[str, int]
