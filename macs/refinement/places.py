@@ -207,7 +207,9 @@ class KnownPoints:
         X = coordinates(task, self.F)
         parts = shares(X)
         rows = np.flatnonzero(parts)
-        nlp = self.programs(self.known[rows[np.argmin((X[rows] ** 2).sum(axis=1))]].method)
+        # The finest of their meshes: an end may have few degrees of freedom because it needs none, and a point beside it then lacks them.
+        near = rows[np.argsort((X[rows] ** 2).sum(axis=1), kind="stable")]
+        nlp = max((self.programs(self.known[i].method) for i in near), key=lambda one: len(one.variables))
         refuse_dense(nlp)
         around = [self.known[i].on(nlp, self.units) for i in rows]
         return nlp.transcription, task, *predicted(task, nlp, around, parts[rows]), float(self.front.stats["tolerance"])
