@@ -5,12 +5,14 @@ import pickle
 import shutil
 import subprocess
 import sys
+import time
 import warnings
 import zipfile
 
 import casadi as ca
 import numpy as np
 import pytest
+from test_externals import ascent
 
 from macs import optimize, sweep
 from problems import Problem, external, fmu
@@ -197,12 +199,6 @@ def library(folder, kind):
     return f"{compiled(folder / 'model.c', folder / 'model.so')}:rates"
 
 
-def ascent(rates=None):
-    from tests.problems.test_externals import ascent
-
-    return ascent(rates)
-
-
 @needs_a_compiler
 @pytest.mark.parametrize("kind", ["none", "jacobian", "forward", "reverse"])
 def test_the_front_with_a_library_is_that_of_the_same_rates_in_casadi(kind, tmp_path):
@@ -212,6 +208,18 @@ def test_the_front_with_a_library_is_that_of_the_same_rates_in_casadi(kind, tmp_
     made = external(path, states=["x", "vx", "y", "vy"], controls=["u"])
     pattern = ca.jacobian(made, ca.vertcat(*ca.symvar(made))).nnz()
     assert pattern == {"none": 24, "jacobian": 4}.get(kind, pattern)
+
+
+@needs_a_compiler
+@pytest.mark.slow
+def test_a_library_with_derivatives_takes_at_most_three_times_the_cpu_time(tmp_path):
+    def seconds(rates):
+        sweep(ascent(rates), DFET(4, 6), points=2, starts=1)  # what the first call alone takes
+        begin = time.process_time()
+        sweep(ascent(rates), DFET(4, 6), points=5, starts=3)
+        return time.process_time() - begin
+
+    assert seconds(library(tmp_path, "jacobian")) <= 3.0 * seconds(None)
 
 
 @needs_a_compiler
