@@ -24,7 +24,7 @@ from .fronts.verified import VERIFY, fixed_scales, simulated, unmarked, verified
 from .gradients.front_polish import polished
 from .io.text import counted
 from .io.workers import Workers, processes
-from .pareto.dominance import nearest
+from .pareto.dominance import normalised
 from .refinement.front_refinement import refine_mesh
 from .refinement.mending import mended
 from .refinement.places import dense_front, nearest_point, point_at
@@ -342,8 +342,8 @@ class Front(Points):
         the first one is 175. Its `error` is estimated, its `pieces` end at kinks and gaps, and `rates` are its slopes.
 
         Points that are not feasible, not verified (if the front was simulated), dominated, or without `weights` are left out, as the
-        curve's `message` says. Without any weights, as for a vector problem, the curve is a fit: its error is what points miss it by that
-        are left out of it, and `rates_known` is False. A front from a file has the same curve.
+        curve's `message` says. Without any weights, as of a vector problem or a search without gradients, there is no curve: such points
+        lie above the front by what nobody knows. A front from a file has the same curve.
 
         Returns
         -------
@@ -352,7 +352,7 @@ class Front(Points):
         Raises
         ------
         ValueError
-            With more or fewer than two objectives; with fewer than two points on the front, or without weights than four.
+            With more or fewer than two objectives, and with fewer than two points on the front that have weights.
 
         Examples
         --------
@@ -365,13 +365,9 @@ class Front(Points):
         return curve_of(self)
 
     def knee(self) -> Point:
-        """The point nearest to the knee of `curve`: where that is farthest below the line between its ends, in ranges of the objectives
-        (Das 1999), so that little more of one objective costs much of the other on either side. It does not depend on units.
-
-        Raises
-        ------
-        ValueError
-            As for `curve`.
+        """The knee of a front of two objectives: the point farthest below the line between its ends, in ranges of the objectives (Das 1999,
+        see `FrontCurve.knee`), so that on either side little more of one costs much of the other. Units do not matter. Raises ValueError
+        with more or fewer than two objectives, and without points.
 
         Examples
         --------
@@ -379,8 +375,9 @@ class Front(Points):
         >>> macs.sweep(problems.load("goddard"), points=7, starts=1).knee().index
         2
         """
-        curve = curve_of(self)
-        return self[int(nearest(curve.knee * self.signs, np.where(np.isfinite(self.F), self.F, np.inf), curve.ranges)[0])]
+        if len(self.goals) != 2 or not len(self):
+            raise ValueError(f"the knee is a point between two ends, and this front has {headline(self)}")
+        return self[int(np.nanargmin(normalised(self.F, np.nanmin(self.F, axis=0), np.nanmax(self.F, axis=0)).sum(axis=1)))]
 
     def table(self, columns: Mapping[str, Sequence[Any]] | None = None, *, details: bool = False) -> str:
         """The front as plain text: a headline, a row for each point, those that are not verified apart, and warnings.

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.checks import check_count
+from problems.checks import check_count, check_interval
 from problems.compiled import CompiledProblem
 from problems.problem import Problem
 from problems.sampling import refuse_peaks
@@ -28,6 +28,7 @@ from transcription.stopping import Stopped
 from .evaluation.evaluator import CONVERGED, INFEASIBLE
 from .front import Front
 from .fronts.builders import certified, conflict, from_vectors, no_points
+from .fronts.curve import GAPS
 from .fronts.point import Point
 from .fronts.points import Points
 from .fronts.provenance import costs
@@ -35,6 +36,7 @@ from .fronts.verified import VERIFY, check_verify
 from .gradients.ends import ENDS, METHODS, check_points, lexicographic_ends, solve_tasks, tasks_between
 from .gradients.multistart import MultistartSolver, MultistartStopping, Rules
 from .gradients.scalarised import END, MOST_ITERATIONS, WEAK, WORK, GradientSolves, Scalarised
+from .gradients.tracing import CurveTrace
 from .io.console import working
 from .io.workers import Workers
 from .pareto.dominance import distinct, separate
@@ -181,7 +183,8 @@ def sweep(
     problem: Problem | CompiledProblem,
     transcription: Transcription | None = None,
     *,
-    points: int,
+    points: int | None = None,
+    error: float | None = None,
     method: str = "pascoletti-serafini",
     start: Any = None,
     starts: int | str = "auto",
@@ -200,8 +203,11 @@ def sweep(
     problem, transcription, start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress
         As for `optimize`; each point is solved from so many `starts`. "auto": the optimum of each objective from as many as pay, see
         `payoff`; the points between, each from the one before, then from others as long as these find better ones.
-    points : int
-        Number of points, the ends included; with three or more objectives, the largest number.
+    points : int, optional
+        Number of points, the ends included; with three or more objectives, the largest number. Default: as many as `error` takes.
+    error : float, optional
+        With two objectives, instead of a number of points: points are solved where the curve of the front errs most (`Front.curve`), until
+        its estimated error, in ranges of the objectives, is less; at most 100. Kinks and gaps are found on the way. Default: 1e-3.
     method : "pascoletti-serafini" or "epsilon"
         "pascoletti-serafini": from evenly spread points on the line, or simplex, between the ends, all objectives are decreased in
         proportion to their ranges, which spreads the points evenly (Pascoletti and Serafini 1984; Das and Dennis 1998). "epsilon": the
@@ -210,12 +216,14 @@ def sweep(
     Returns
     -------
     Front
-        Points that converged, mutually non-dominated. `message` says how many were left out and, if none converged, why.
+        Points that converged, mutually non-dominated. `message` says how many were left out and, if none converged, why; and if the error
+        is larger than was asked for. `stats["gaps"]` has pairs of values of the first objective between which there are no points.
 
     Raises
     ------
     ValueError
-        As for `optimize`; also for an unknown method, fewer points than objectives, and a problem with one objective.
+        As for `optimize`; also for an unknown method, fewer points than objectives, a problem with one objective, and `error` beside
+        `points`, by another method, or with three or more objectives.
 
     Examples
     --------
@@ -223,13 +231,23 @@ def sweep(
     >>> len(macs.sweep(problems.load("goddard"), points=3, starts=1))
     3
     """
-    check_count("points", points, 2)
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; there are {', '.join(METHODS)}")
     terms = Terms(start, starts, seed, tolerance, verify, max_iterations, time_limit, workers, progress)
-    job = _Job("sweep", problem, transcription, terms, points=int(points), method=method)
-    check_points(points, len(job.problem.goals))
-    return job.run(lambda: job.swept(points, method), lambda front, verify: mended(front, verify, ends=job.ends, size=points))
+    if points is not None and error is not None:
+        raise ValueError("give either points or error: with error, as many points are solved as it takes")
+    check_count("points", 2 if points is None else points, 2)
+    error = VERIFY if points is None and error is None else error
+    check_interval("error", 1.0 if error is None else error, "(0, 1]")
+    settings = {"error": error} if points is None else {"points": int(points)}
+    job = _Job("sweep", problem, transcription, terms, **settings, method=method)
+    m = len(job.problem.goals)
+    if points is None and (m > 2 or method != METHODS[0]):
+        raise ValueError(f"error is for fronts of two objectives by {METHODS[0]!r}; give points instead")
+    check_points(points or m, m)
+    return job.run(
+        partial(job.swept, points or 0, method, error), lambda front, verify: mended(front, verify, ends=job.ends, size=points or 0)
+    )
 
 
 def check_starts(name: str, starts: int | str) -> None:
@@ -286,6 +304,7 @@ class _Job:
         self._about = {"name": name, "settings": {**settings, **terms.settings}}
         self._stopped = ""
         self._sole: np.ndarray | None = None
+        self._certificates = dict[Any, dict[str, Any]]()
         self.ends: Points | None = None  # those by which the mesh was found, on their own meshes
         self._stopping: dict[int, MultistartStopping] = {}
         self.solves = GradientSolves(float(terms.tolerance), int(terms.max_iterations))
@@ -368,16 +387,38 @@ class _Job:
                 points = points.replace(notes=[f"{found.note}; {conflict(found.nlp, points[0])}"])
             return Front.of(points).verify(verify)
 
-    def swept(self, points: int, method: str) -> Front:
-        """The front of a sweep; its ends alone if one of them was not found."""
+    def swept(self, points: int, method: str, error: float | None) -> Front:
+        """The front of a sweep, with so many points or a curve that errs by less; its ends alone if one of them was not found."""
         for _ in range(ENDS.from_rivals):
-            ends = lexicographic_ends(self.solver)
+            ends, trace = lexicographic_ends(self.solver), None
+            ranges = self.ranges(ends)
             if any(end.status != CONVERGED for end in ends):
                 return self.sifted(ends)
-            found = solve_tasks(self.solver, tasks_between(np.array([end.F for end in ends]), self.ranges(ends), points, method))
+            if error is not None and ranges.all():
+                trace = CurveTrace(self.solver, ends, partial(self._weights, ranges=ranges), error)
+                found = trace.go()
+            else:
+                found = solve_tasks(self.solver, tasks_between(np.array([end.F for end in ends]), ranges, points, method))
             if not self.surpassed(ends, found):
                 break
-        return self.sifted([*ends, *found], self.ranges(ends))
+        if trace is None:
+            return self.sifted([*ends, *found], ranges)
+        front, left = self.sifted(trace.points() or trace.found, ranges), trace.curve.error
+        missed = f"the curve errs by about {left:.1e} of the ranges, and not by less than {error:g}" if left > trace.wanted else ""
+        gaps = [sorted(float(front.signs[0] * one.F[0]) for one in gap) for gap in trace.gaps]
+        return front.replace(stats=front.stats | {GAPS: gaps}, message="; ".join(filter(None, [front.message, missed])))
+
+    def _weights(self, solved: Solved, ranges: np.ndarray) -> np.ndarray | None:
+        """The weights (m,) of the objectives at a result; None where they are not known."""
+        known = self._certificate(solved.z, ranges)["costates"]
+        return None if known is None else known.weights
+
+    def _certificate(self, z: np.ndarray, ranges: np.ndarray | None) -> dict[str, Any]:
+        """The entries of `certified` for a vector, found once."""
+        key = z.tobytes(), str(ranges)
+        if key not in self._certificates:
+            self._certificates[key] = {name: one for name, (one,) in certified(self.nlp, z[None], ranges, self._sole).items()}
+        return self._certificates[key]
 
     def ranges(self, ends: Sequence[Solved]) -> np.ndarray:
         """Ranges (m,) of the objectives between the ends; 0 for one that is in conflict with no other."""
@@ -415,7 +456,8 @@ class _Job:
         """The results as a front, with their optimality and costates; objectives are scaled by `ranges` (m,)."""
         Z = np.array([solved.z for solved in found]).reshape(len(found), len(self.nlp.variables))
         status, notes = [solved.status for solved in found], [WEAK if solved.message == WEAK else "" for solved in found]
-        more |= {"status": status, "notes": notes, **certified(self.nlp, Z, ranges, self._sole)}
+        columns = [self._certificate(z, ranges) for z in Z]
+        more |= {"status": status, "notes": notes, **{name: [one[name] for one in columns] for name in (columns[0] if columns else ())}}
         return Front.of(from_vectors(self.nlp, Z, self._about, self._stats(), **more))
 
     def _stats(self) -> dict[str, Any]:

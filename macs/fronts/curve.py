@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -25,18 +26,7 @@ class FrontCurve:
 
     Objectives, both minimised, are scaled to u in [0, 1] between the two ends of the front. The curve is a function of the place along the
     line between the ends, s = (1 + u1 - u2) / 2, which is the parameter of Pascoletti and Serafini (1984): its value is the height
-    h = (u1 + u2 - 1) / 2 over that line. Slopes of h are in [-1, 1] also where the front is vertical or horizontal. Pieces end at kinks, as
-    where a constraint becomes active or two valleys cross, and at gaps.
-
-    Without any weights, as for a vector problem, the curve is a monotone fit: its errors are those that points have which are left out of
-    it.
-
-    Attributes
-    ----------
-    rates_known : bool
-        Whether slopes are those of the points; else they are fitted.
-    message : str
-        Which points were left out; empty if none.
+    h = (u1 + u2 - 1) / 2 over that line. Slopes of h are in [-1, 1], also where the front is vertical or horizontal.
 
     Examples
     --------
@@ -50,14 +40,26 @@ class FrontCurve:
     least: np.ndarray  # (2,): best values, all minimised
     ranges: np.ndarray  # (2,)
     parts: tuple[CurvePiece, ...]
-    rates_known: bool
-    message: str
+    message: str  # which points were left out; empty if none
+
+    @classmethod
+    def through(cls, goals: Sequence[Objective], F: np.ndarray, weights: np.ndarray, gaps: Sequence[float], message: str = "") -> Self:
+        """The curve through points of a front with objectives, all minimised, and weights (n, 2); `gaps` has a first objective in each."""
+        order = np.argsort(F[:, 0])
+        curve = cls(tuple(goals), F.min(axis=0), np.ptp(F, axis=0), (), message)
+        worth = (weights * curve.ranges)[order].T
+        parts = pieces(*curve.placed(F[order]), (worth[1] - worth[0]) / worth.sum(axis=0), np.searchsorted(F[order, 0], gaps).tolist())
+        return replace(curve, parts=tuple(parts))
+
+    def placed(self, F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places and heights (...,) of points with objectives (..., 2), all minimised."""
+        u = (F - self.least) / self.ranges
+        return 0.5 * (1.0 + u[..., 0] - u[..., 1]), 0.5 * (u[..., 0] + u[..., 1] - 1.0)
 
     def __repr__(self) -> str:
-        kind = "" if self.rates_known else ", fitted without rates"
         left = f"; {self.message}" if self.message else ""
         names = " against ".join(f"'{goal.name}'" for goal in self.goals)
-        return f"<FrontCurve: {names}, {counted(len(self.parts), 'piece')}, error about {self.error:.1e} of the ranges{kind}{left}>"
+        return f"<FrontCurve: {names}, {counted(len(self.parts), 'piece')}, error about {self.error:.1e} of the ranges{left}>"
 
     def __call__(self, value: Any, objective: str | int | None = None) -> np.ndarray:
         """Objectives on the curve where one of them has a value.
@@ -67,56 +69,33 @@ class FrontCurve:
         value : float or array (...,)
             In the user's unit.
         objective : str or int, optional
-            The name or number of the objective that has this value. Default: the first one.
+            The name or number of the objective that has this value. Default: the first one. Raises ValueError if there is no such one.
 
         Returns
         -------
         array (2,) or (..., 2)
             In the user's units and senses; NaN off the front and in its gaps.
-
-        Raises
-        ------
-        ValueError
-            If there is no such objective.
         """
         return self.at_parameter(self.parameter(value, objective))
 
     def rates(self, value: Any, objective: str | int | None = None) -> np.ndarray:
-        """How much the other objective changes along the front for a unit more of this one, where this has a value; see `TradeOffs.rate`.
-
-        Parameters
-        ----------
-        value, objective
-            As for a call.
-
-        Returns
-        -------
-        array (...,)
-            In the user's units; infinite where the front is vertical, NaN off it.
-
-        Raises
-        ------
-        ValueError
-            If there is no such objective.
-        """
+        """How much the other objective changes along the front for a unit more of this one, where this has a value (...,), in the user's
+        units; infinite where the front is vertical, NaN off it. See `TradeOffs.rate`. Raises ValueError if there is no such objective."""
         i = self._number(objective)
-        slopes = self._at(self.parameter(value, i))[1] * (1 - 2 * i)
+        slopes = self.at(self.parameter(value, i))[1] * (1 - 2 * i)
         with np.errstate(divide="ignore"):
             falls = (1.0 - slopes) / (1.0 + slopes)
         return -falls * self.goals[0].sign * self.goals[1].sign * self.ranges[1 - i] / self.ranges[i]
 
     @property
     def error(self) -> float:
-        """An estimate of the largest distance of the curve from the front, along its normal, in ranges of the objectives.
-
-        It is the largest difference of interpolants of different orders, and holds where there are no kinks, gaps or valleys that no point
-        tells of. Solves on another mesh differ by what the meshes do.
-        """
+        """An estimate of the largest distance of the curve from the front, along its normal, in ranges of the objectives, from interpolants
+        of different orders. It knows of no kinks, gaps and valleys that no point tells of, and nothing of other meshes."""
         return max((float(one.max()) for one in self.errors if len(one)), default=BETTER)
 
     @property
     def errors(self) -> tuple[np.ndarray, ...]:
-        """The estimates between the nodes of each piece; see `error`."""
+        """The same between the nodes of each piece."""
         return tuple(part.errors for part in self.parts)
 
     @property
@@ -130,17 +109,7 @@ class FrontCurve:
         return np.array([part.interval for part in self.parts])
 
     def sample(self, count: int = 200) -> np.ndarray:
-        """Objectives at about so many places along the curve, each piece with its ends; a row of NaN lies between pieces with a gap.
-
-        Parameters
-        ----------
-        count : int
-
-        Returns
-        -------
-        array (k, 2)
-            In the user's units and senses.
-        """
+        """Objectives (k, 2) at about so many places along the curve, in the user's units and senses, with a row of NaN in each gap."""
         rows: list[np.ndarray] = []
         for k, part in enumerate(self.parts):
             start, end = part.interval
@@ -151,18 +120,8 @@ class FrontCurve:
         return np.concatenate(rows)
 
     def distances(self, objectives: np.ndarray) -> np.ndarray:
-        """Distances of points from the curve, in ranges of its objectives.
-
-        Parameters
-        ----------
-        objectives : array (n, 2)
-            In the user's units and senses.
-
-        Returns
-        -------
-        array (n,)
-        """
-        points = np.column_stack(self._placed(np.asarray(objectives, dtype=float)))[:, None]
+        """Distances (n,) of points from the curve, in its ranges; objectives (n, 2) in the user's units and senses."""
+        points = np.column_stack(self.placed(np.asarray(objectives) * [goal.sign for goal in self.goals]))[:, None]
         found = np.full(len(points), np.inf)
         for part in self.parts:
             places = np.unique(np.concatenate([part.spread(2001), part.places]))
@@ -178,7 +137,7 @@ class FrontCurve:
         """Objectives (2,) of the knee: the point of the curve farthest below the line between its ends, in ranges (Das, "On characterizing
         the 'knee' of the Pareto curve based on normal-boundary intersection", Structural Optimization 18, 1999)."""
         places = np.concatenate([part.spread(2001) for part in self.parts])
-        return self.at_parameter(places[np.nanargmin(self._at(places)[0])])
+        return self.at_parameter(places[np.nanargmin(self.at(places)[0])])
 
     def parameter(self, value: Any, objective: str | int | None = None) -> np.ndarray:
         """Places (...,) where an objective has a value, as for a call; NaN off the front and in its gaps."""
@@ -186,9 +145,8 @@ class FrontCurve:
         u = (np.asarray(value, dtype=float) * self.goals[i].sign - self.least[i]) / self.ranges[i]
         found = np.full(u.shape, np.nan)
         for part in self.parts:
-            # What rounding leaves beyond the ends belongs to them.
             low, high = sorted(_scaled(part.places[[0, -1]], part.heights[[0, -1]])[..., i])
-            here = (u >= low - 1e-9) & (u <= high + 1e-9)
+            here = (u >= low - 1e-9) & (u <= high + 1e-9)  # with what rounding leaves
             start, end = (np.full(u.shape, one) for one in part.interval)
             for _ in range(60):
                 middle = 0.5 * (start + end)
@@ -199,51 +157,33 @@ class FrontCurve:
 
     def at_parameter(self, places: Any) -> np.ndarray:
         """Objectives (..., 2) at places (...,), in the user's units and senses; NaN off the front and in its gaps."""
-        places = np.asarray(places, dtype=float)
-        return self._objectives(places, self._at(places)[0])
+        return self._objectives(np.asarray(places, dtype=float), self.at(places)[0])
 
-    def _at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Heights and slopes (...,) at places; NaN where there are none."""
-        heights, slopes = np.full(np.shape(places), np.nan), np.full(np.shape(places), np.nan)
+    def at(self, places: Any) -> np.ndarray:
+        """Heights, slopes and errors (3, ...) at places (...,); NaN where there are none."""
+        places = np.asarray(places, dtype=float)
+        found = np.full((3, *places.shape), np.nan)
         for part in self.parts:
             start, end = part.interval
-            here = (places >= start) & (places <= end)
-            found = part(np.clip(places, start, end))
-            heights, slopes = np.where(here, found[0], heights), np.where(here, found[1], slopes)
-        return heights, np.clip(slopes, -1.0, 1.0)
+            inside = np.clip(places, start, end)
+            found = np.where((places >= start) & (places <= end), [*part(inside), part.errors_at(inside)], found)
+        found[1] = np.clip(found[1], -1.0, 1.0)
+        return found
 
     def _objectives(self, places: np.ndarray, heights: np.ndarray) -> np.ndarray:
         """Objectives (..., 2), in the user's units and senses, of places and heights."""
         return (self.least + self.ranges * _scaled(places, heights)) * np.array([goal.sign for goal in self.goals])
 
-    def _placed(self, objectives: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places and heights of objectives (n, 2) in the user's units and senses."""
-        return placed((objectives * np.array([goal.sign for goal in self.goals]) - self.least) / self.ranges)
-
     def _number(self, objective: str | int | None) -> int:
         names = [goal.name for goal in self.goals]
-        if objective in (None, *range(2)):
-            return int(objective or 0)
-        if objective in names:
-            return names.index(str(objective))
-        raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
-
-
-def placed(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places and heights (...,) of objectives (..., 2) in ranges."""
-    return 0.5 * (1.0 + u[..., 0] - u[..., 1]), 0.5 * (u[..., 0] + u[..., 1] - 1.0)
+        if objective not in (None, 0, 1, *names):
+            raise ValueError(f"there is no objective {objective!r}; there are {', '.join(names)}")
+        return names.index(objective) if isinstance(objective, str) else objective or 0
 
 
 def _scaled(places: np.ndarray, heights: np.ndarray) -> np.ndarray:
     """Objectives (..., 2) in ranges, of places and heights."""
     return np.stack([places + heights, 1.0 - places + heights], axis=-1)
-
-
-def slopes(weights: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Slopes (...,) of a front at points whose objectives have these weights (..., 2)."""
-    worth = weights * ranges
-    with np.errstate(invalid="ignore"):
-        return (worth[..., 1] - worth[..., 0]) / worth.sum(axis=-1)
 
 
 def curve_of(front: Any) -> FrontCurve:
@@ -252,39 +192,29 @@ def curve_of(front: Any) -> FrontCurve:
         names = ", ".join(f"'{name}'" for name in front.names)
         raise ValueError(f"a curve is a front of two objectives, and this one has {len(front.goals)}: {names}")
     weights = np.array([np.full(2, np.nan) if one is None else one.weights for one in front.costates]).reshape(-1, 2)
+    masks = {
+        "not feasible": (front.status == CONVERGED) & np.isfinite(front.F).all(axis=1),
+        "not verified": front.verified | ~front.was_simulated,
+        "without weights": ~np.isnan(weights).any(axis=1),
+    }
+    good = np.all([*masks.values()], axis=0)
+    masks["dominated or equal"] = np.zeros(len(front), dtype=bool)
+    masks["dominated or equal"][good] = alone(front.F[good], np.ptp(front.F[good], axis=0) if good.any() else np.ones(2))
     kept, left = np.ones(len(front), dtype=bool), list[str]()
-    rates_known = ~np.isnan(weights).any(axis=1)
-    for word, good in (
-        ("not feasible", (front.status == CONVERGED) & np.isfinite(front.F).all(axis=1)),
-        ("not verified", front.verified | ~front.was_simulated),
-        ("without weights", rates_known | ~rates_known.any()),
-        ("dominated or equal", None),
-    ):
-        if good is None:
-            good = np.zeros(len(front), dtype=bool)
-            good[kept] = _alone(front.F[kept])
-        left += [f"{np.count_nonzero(kept & ~good)} {word}"] if (kept & ~good).any() else []
-        kept &= good
+    for word, mask in masks.items():
+        left += [f"{np.count_nonzero(kept & ~mask)} {word}"] if (kept & ~mask).any() else []
+        kept &= mask
     message = f"of {counted(len(front), 'point')} left out: {', '.join(left)}" if left else ""
-    least = 2 if rates_known.any() else 4
-    if kept.sum() < least:
-        rest = f"; {message or front.message}".rstrip("; ")
-        raise ValueError(
-            f"a curve needs {least} points of the front at least, and there {'is' if kept.sum() == 1 else 'are'} {kept.sum()}{rest}"
-        )
-    F, weights = front.F[kept], weights[kept]
-    best, ranges = F.min(axis=0), np.ptp(F, axis=0)
-    s, h = placed((F - best) / ranges)
-    order = np.argsort(s)
-    gaps = front.signs[0] * np.array(front.stats.get(GAPS, [])).reshape(-1, 2).mean(axis=1)
-    parts = pieces(s[order], h[order], slopes(weights, ranges)[order], np.searchsorted(F[order, 0], gaps).tolist())
-    return FrontCurve(front.goals, best, ranges, tuple(parts), bool(rates_known.any()), message)
+    if kept.sum() < 2:
+        rest = f": {message or front.message}".removesuffix(": ")
+        raise ValueError(f"a curve goes through two points of a front at least, whose weights are its slopes{rest}")
+    gaps = front.signs[0] * np.reshape(front.stats.get(GAPS, []), (-1, 2)).mean(axis=1)
+    return FrontCurve.through(front.goals, front.F[kept], weights[kept], gaps.tolist(), message)
 
 
-def _alone(F: np.ndarray) -> np.ndarray:
-    """Mask (n,) of points that no other dominates or equals, to the accuracy of solves."""
+def alone(F: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Mask (n,) of points (n, m) that no other dominates or equals, to the accuracy of solves. ranges (m,)."""
     kept = np.zeros(len(F), dtype=bool)
-    if len(F):
-        rows = np.flatnonzero(nondominated(F))
-        kept[rows[separate(F[rows], np.ptp(F[rows], axis=0))]] = True
+    rows = np.flatnonzero(nondominated(F))
+    kept[rows[separate(F[rows], ranges)]] = True
     return kept

@@ -1,10 +1,9 @@
 """Cubic pieces through points of a curve and its slopes: where they end, and an estimate of their error.
 
 Places s lie along the line between the ends of a front, heights h across it, both in ranges of the objectives; a front has slopes h' in
-[-1, 1]. Between neighbours the curve is the cubic Hermite interpolant. What it errs by is estimated from the quintics that also go through
-the next point on either side. Pieces end where the curve has a kink, such as the corner that a new constraint makes or the crossing of two
-valleys, or a gap, where what goes on is dominated. A break is accepted where both sides, extrapolated, explain the points by far better
-than one smooth curve does.
+[-1, 1]. Between neighbours the curve is the cubic Hermite interpolant; its error is estimated from the quintics through the next point on
+either side. Pieces end at kinks, where a constraint becomes active or valleys cross, and at gaps, where what goes on is dominated: there
+both sides, extrapolated, explain the points by far better than one smooth curve does.
 """
 
 from __future__ import annotations
@@ -17,16 +16,15 @@ import numpy as np
 
 from ..pareto.dominance import BETTER
 
-Polynomial = Callable[[np.ndarray | float], tuple[np.ndarray, np.ndarray]]
-"""Heights and slopes at places."""
+Polynomial = Callable[[np.ndarray | float], tuple[np.ndarray, np.ndarray]]  # heights and slopes at places
 
 
 @dataclass(frozen=True)
 class FitLimits:
     """When something else explains points better than a smooth curve with their slopes."""
 
-    better: float = 0.1  # part of the error of a smooth curve that a break may leave
-    unsure: float = 4.0  # multiple of what its prediction is unsure by, by which a slope at an end differs if it is one of several
+    better: float = 0.1  # part of the error of a smooth curve, or of a doubtful slope, that the explanation may leave
+    hidden: float = 0.06  # part of the triangle of chord and tangents that estimates of errors are at least: points may miss something
 
 
 FIT = FitLimits()
@@ -52,50 +50,43 @@ class CurvePiece:
 
     def __call__(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights and slopes at places within the piece, any shape."""
+        from scipy.interpolate import CubicHermiteSpline  # slow to import
+
         if len(self.places) == 1:
             return np.full(np.shape(places), self.heights[0]), np.full(np.shape(places), self.slopes[0])
-        i = np.clip(np.searchsorted(self.places, places, side="right") - 1, 0, len(self.places) - 2)
-        length = self.places[i + 1] - self.places[i]
-        t, rise = (places - self.places[i]) / length, self.heights[i + 1] - self.heights[i]
-        first, last = self.slopes[i] * length - rise, rise - self.slopes[i + 1] * length
-        heights = self.heights[i] + t * rise + t * (1 - t) * ((1 - t) * first + t * last)
-        slopes = rise + (1 - 2 * t) * ((1 - t) * first + t * last) + t * (1 - t) * (last - first)
-        return heights, slopes / length
+        cubic = CubicHermiteSpline(self.places, self.heights, self.slopes)
+        return cubic(places), cubic(places, 1)
 
-
-def distance(heights: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Distances along the normal, in ranges, for differences in height of a curve with these slopes."""
-    return np.sqrt(2.0 / (1.0 + slopes**2)) * np.abs(heights)
+    def errors_at(self, places: np.ndarray) -> np.ndarray:
+        """Estimated errors at places within the piece."""
+        return np.append(self.errors, 0.0)[np.clip(np.searchsorted(self.places, places, side="right") - 1, 0, max(len(self.errors) - 1, 0))]
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """Points that may be on one smooth curve, with slopes, NaN where unknown; at its sides the edges of its piece beyond, as a place,
-    height, slope and error each."""
+    """Points that may be on one smooth curve; at its sides the edges of its piece beyond, as a place, height, slope and error each."""
 
     s: np.ndarray
     h: np.ndarray
     d: np.ndarray
     before: tuple[float, float, float, float] | None = None
     after: tuple[float, float, float, float] | None = None
-    inferred: tuple[int, ...] = ()  # the points whose slopes follow from those beside
+    inferred: tuple[int, ...] = ()  # sides whose slopes follow from the points beside
 
     def through(self, *points: int, free: Sequence[int] = ()) -> Polynomial:
         """The polynomial through points and their slopes, but for those of the points `free`."""
-        i = np.array(points)
-        return _through(self.s[i], self.h[i], np.where(np.isin(i, free), np.nan, self.d[i]))
+        from scipy.interpolate import KroghInterpolator  # slow to import
+
+        data = [(self.s[i], value) for i in points for value in ((self.h[i],) if i in free else (self.h[i], self.d[i]))]
+        polynomial = KroghInterpolator(*np.array(data).T)
+        return lambda places: (polynomial(places), polynomial.derivative(places))
 
     def known(self) -> _Run:
-        """The same with a slope at each point: those that are unknown, and those at its sides that the points beside contradict, from the
-        points beside."""
-        d, n = self.d.copy(), len(self.s)
-        run, inferred = _Run(self.s, self.h, d), np.flatnonzero(np.isnan(d)).tolist()
-        for i in inferred:
-            near = [j for j in (i - 1, i, i + 1) if 0 <= j < n]
-            d[i] = np.clip(run.through(*near, free=[i])(self.s[i])[1], -1.0, 1.0)
+        """The same with slopes at its sides from the points beside where these contradict them: there they may be one of several."""
+        d, n, inferred = self.d.copy(), len(self.s), list[int]()
         for i, step in ((0, 1), (n - 1, -1)) if n > 2 else ():
-            likely, rough = (float(run.through(*near, free=[i])(self.s[i])[1]) for near in ((i, i + step, i + 2 * step), (i, i + step)))
-            if abs(d[i] - likely) > FIT.unsure * abs(likely - rough):
+            likely, rough = (float(self.through(*near, free=[i])(self.s[i])[1]) for near in ((i, i + step, i + 2 * step), (i, i + step)))
+            if FIT.better * abs(d[i] - likely) > abs(likely - rough):
                 d[i] = np.clip(likely, -1.0, 1.0)
                 inferred.append(i)
         return _Run(self.s, self.h, d, self.before, self.after, tuple(inferred))
@@ -107,10 +98,15 @@ class _Run:
         # At a side, also what one without the slope there would be, which may be one of several.
         for side, *more in ((0, 1, 2), (n - 1, n - 2, n - 3)) if n > 2 else ():
             if side in (i, i + 1):
-                rivals.append(self.through(side, *more, free=[side, more[1]] if side in self.inferred else [side]))
+                rivals.append(self.through(side, *more[: 1 if side in self.inferred else 2], free=[side]))
         # Of two points alone: what one without either slope would be.
         rivals = rivals or [self.through(i, i + 1, free=[j]) for j in (i, i + 1)]
         return _apart(cubic, rivals, self.s[i], self.s[i + 1])
+
+    def errors(self) -> np.ndarray:
+        """The estimated errors (n - 1,) between points: at least a small part of what the slopes at both leave open."""
+        tangents = 0.25 * np.diff(self.s) * np.abs(np.diff(self.d)) * _normal(0.5 * (self.d[1:] + self.d[:-1]))
+        return np.maximum([self.error(i) for i in range(len(self.s) - 1)], FIT.hidden * tangents)
 
     def side(self, i: int, step: int) -> tuple[Polynomial, Polynomial]:
         """The polynomial through points i and up to two further ones on its side, to be extrapolated, and one of a lower degree."""
@@ -122,7 +118,7 @@ class _Run:
     def piece(self) -> CurvePiece:
         """The piece of the curve."""
         run = self.known()
-        errors = [run.error(i) for i in range(len(run.s) - 1)]
+        errors = run.errors().tolist()
         nodes = [*zip(run.s, run.h, run.d, strict=True)]
         if self.before is not None and self.before[0] < self.s[0]:
             nodes, errors = [self.before[:3], *nodes], [self.before[3], *errors]
@@ -133,34 +129,11 @@ class _Run:
 
 
 def pieces(s: np.ndarray, h: np.ndarray, d: np.ndarray, first: Sequence[int] = ()) -> list[CurvePiece]:
-    """The pieces of the curve through points with places in ascending order, heights and slopes (n,), which may be NaN where unknown.
-    Before the points `first` there are gaps."""
-    if np.isnan(d).all():
-        return [_fitted(s, h)]
+    """The pieces of the curve through points with places in ascending order, heights and slopes (n,). Before the
+    points `first` there are gaps."""
     ends = [0, *sorted(set(first) - {0, len(s)}), len(s)]
     runs = [_Run(s[a:b], h[a:b], d[a:b]) for a, b in pairwise(ends)]
     return [part.piece() for run in runs for part in _split(run)]
-
-
-def _fitted(s: np.ndarray, h: np.ndarray) -> CurvePiece:
-    """A monotone cubic through points without slopes (Fritsch and Carlson 1980); its errors are those at the points beside, left out."""
-    missed = np.zeros(len(s))
-    for i in range(1, len(s) - 1):
-        height, slope = CurvePiece(np.delete(s, i), np.delete(h, i), _monotone(np.delete(s, i), np.delete(h, i)), np.empty(0))(s[i])
-        missed[i] = distance(h[i] - height, slope)
-    missed[[0, -1]] = missed[[1, -2]]
-    return CurvePiece(s, h, _monotone(s, h), np.maximum(missed[1:], missed[:-1]) + BETTER)
-
-
-def _monotone(s: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """Slopes (n,) of parabolas through neighbours, limited so that both objectives are monotone in between."""
-    chords = np.diff(h) / np.diff(s)
-    beside = np.stack([np.r_[chords[0], chords], np.r_[chords, chords[-1]]])
-    lengths = np.r_[np.diff(s)[0], np.diff(s), np.diff(s)[-1]]
-    slopes = (beside[0] * lengths[1:] + beside[1] * lengths[:-1]) / (lengths[1:] + lengths[:-1])
-    return np.clip(
-        slopes, np.maximum(-1.0, 1.0 - 3.0 * (1.0 - beside.max(axis=0))), np.minimum(1.0, 3.0 * (1.0 + beside.min(axis=0)) - 1.0)
-    )
 
 
 def _split(run: _Run) -> list[_Run]:
@@ -169,7 +142,7 @@ def _split(run: _Run) -> list[_Run]:
     if n < 4:
         return [run]
     known = run.known()
-    errors = np.array([known.error(i) for i in range(n - 1)])
+    errors = [known.error(i) for i in range(n - 1)]
     best: tuple[float, list[_Run]] = (FIT.better, [])
     for i in range(1, n - 2):
         best = min(best, _between(run, known, i, errors[i]), key=lambda one: one[0])
@@ -224,7 +197,7 @@ def _admissible(one: Polynomial, places: np.ndarray) -> float:
 
 
 def _at_point(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list[_Run]]:
-    """The same for a break at point i, whose slope may be one of several; or, without a jump, the run without that slope."""
+    """The same for a break at point i, whose slope may be one of several."""
     if smooth <= 10 * BETTER:
         return np.inf, []
     slopes, unsure = [], []
@@ -233,40 +206,18 @@ def _at_point(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, lis
         likely, rough = known.through(far, near, i, free=[i]), known.through(near, i, free=[i])
         slopes.append(float(likely(known.s[i])[1]))
         unsure.append(_apart(likely, [rough], *sorted((known.s[near], known.s[i]))))
-    left = max(unsure) / smooth
-    # Where the slope there differs from both sides by more than they differ, it is wrong.
-    if abs(slopes[1] - slopes[0]) < min(abs(run.d[i] - slopes[0]), abs(run.d[i] - slopes[1])):
-        d = run.d.copy()
-        d[i] = np.nan
-        return (np.inf, []) if np.isnan(run.d[i]) else (left, [_Run(run.s, run.h, d, run.before, run.after)])
     d, e = run.d[: i + 1].copy(), run.d[i:].copy()
     d[-1], e[0] = np.clip(slopes, -1.0, 1.0)
-    return left, [_Run(run.s[: i + 1], run.h[: i + 1], d, run.before), _Run(run.s[i:], run.h[i:], e, None, run.after)]
+    return max(unsure) / smooth, [_Run(run.s[: i + 1], run.h[: i + 1], d, run.before), _Run(run.s[i:], run.h[i:], e, None, run.after)]
 
 
 def _apart(one: Polynomial, others: Sequence[Polynomial], start: float, end: float) -> float:
-    """The distances of a polynomial from others between two places, added up, and what solves leave."""
+    """The distances of a polynomial from others along its normal between two places, added up, and what solves leave."""
     places = np.linspace(start, end, 17)
     heights, slopes = one(places)
-    slopes = np.clip(slopes, -1.0, 1.0)
-    return BETTER + sum(float(distance(heights - other(places)[0], slopes).max()) for other in others)
+    return BETTER + sum(float((_normal(slopes) * np.abs(heights - other(places)[0])).max()) for other in others)
 
 
-def _through(s: np.ndarray, h: np.ndarray, d: np.ndarray) -> Polynomial:
-    """The polynomial through heights and slopes, where these are known, at places, by divided differences."""
-    repeated = np.repeat(np.arange(len(s)), 1 + ~np.isnan(d))
-    nodes, column = s[repeated], h[repeated]
-    coefficients = [column[0]]
-    for k in range(1, len(nodes)):
-        length = nodes[k:] - nodes[:-k]
-        column = np.where(length != 0, np.diff(column) / np.where(length == 0, 1.0, length), d[repeated[k:]])
-        coefficients.append(column[0])
-
-    def at(places: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-        height, slope = np.zeros(np.shape(places)), np.zeros(np.shape(places))
-        for coefficient, node in zip(coefficients[::-1], nodes[::-1], strict=True):
-            slope = slope * (places - node) + height
-            height = height * (places - node) + coefficient
-        return height, slope
-
-    return at
+def _normal(slopes: np.ndarray) -> np.ndarray:
+    """Distances along the normal, in ranges, for a height of one over a curve with these slopes."""
+    return np.sqrt(2.0 / (1.0 + np.clip(slopes, -1.0, 1.0) ** 2))

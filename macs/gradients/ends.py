@@ -147,7 +147,12 @@ def solve_tasks(solver: MultistartSolver, tasks: Sequence[Scalarised]) -> list[S
         while _from_other_starts(solver, tasks, found, limit):
             _from_rivals(solver, tasks, found)
     good = [solved for solved in found if solved.status == CONVERGED]
-    ranges = np.ptp([solved.F for solved in good], axis=0) if good else np.zeros(0)
+    return strong(solver, found, np.ptp([solved.F for solved in good], axis=0)) if good else found
+
+
+def strong(solver: MultistartSolver, found: Sequence[Solved], ranges: np.ndarray) -> list[Solved]:
+    """The results, those that may be optimal in the weak sense only improved; see `strongly_optimal`. ranges (m,)."""
+    found = list(found)
     with solver.solves.at_most(END.ties):
         for k, solved in enumerate(found):
             if solved.status == CONVERGED and solved.multipliers is not None:

