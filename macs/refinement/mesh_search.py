@@ -175,10 +175,14 @@ class MeshedOptimum:
             return True, self.solved.violation
         return False, max(self.refinement.best.error, self.behind / settled)
 
-    def certain(self, task: Scalarised) -> bool:
-        """Whether no other start is expected to improve it: it is good, and all starts led to it, or the bounds allow no smaller value."""
-        alike = self.rule.convex or self.hits == self.rule.converged > 1
-        return self.good and (alike or is_least(self.nlp, self.z, task))
+    def proven(self, task: Scalarised) -> bool:
+        """Whether no start improves it: it is good, and the only optimum of its mesh, or the bounds allow no smaller value."""
+        return self.good and (self.rule.convex or is_least(self.nlp, self.z, task))
+
+    @property
+    def agreed(self) -> bool:
+        """Whether it is good, and all starts led to it."""
+        return self.good and self.hits == self.rule.converged > 1
 
     @property
     def optima(self) -> int:
@@ -293,7 +297,7 @@ class MeshSearch:
                 # A coarse mesh may have no feasible point where a finer one has.
                 left.remove(FINEST)
                 left.insert(0, FINEST)
-        if self._starts is None and not self._ends and not self.tasks[0].best.certain(self.tasks[0].task):
+        if self._starts is None and not self._ends:
             self._elsewhere(0)
 
     def best(self, i: int) -> MeshedOptimum:
@@ -348,13 +352,17 @@ class MeshSearch:
     def _elsewhere(self, i: int) -> None:
         """Solve from the best optimum, other optima of the coarse mesh and other starts on an even mesh as fine as its own, if that takes
         little work, and refine results that are better than it or, if it is not good, different from it: on a coarse mesh good optima may
-        be hidden among spurious ones."""
+        be hidden among spurious ones. Where starts agree there, only if its own mesh is much finer and a first solve finds a better one.
+        """
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
         best, task, budget, found = optima.best, optima.task, max(SEARCH.share * before, WORK.little), list[Solved]()
-        if best.refinement is None or loop.ended:
+        if best.refinement is None or loop.ended or best.proven(task):
             return
         present = best.refinement.best
         method = even(present.method)
+        # On few elements there is little that a coarse mesh cannot show.
+        if best.agreed and method.elements <= max(SEARCH.even[0], best.method.elements):
+            return
         nlp, rule = loop.programs(method), MultistartStopping()
 
         def different(solved: Sequence[Solved], most: float) -> list[Solved]:
@@ -374,7 +382,8 @@ class MeshSearch:
                     with loop.solves.at_most(MULTISTART.iterations):
                         found.append(solver.from_vector(nlp.interpolate(trajectory), task))
                     rule.add(task.optimum(found[-1]))
-            found += solver.drawn(min(found, key=task.rank), task, rule, min(before + budget - loop.work, loop.left))[1]
+            if not best.agreed or different(found, best.loss):
+                found += solver.drawn(min(found, key=task.rank), task, rule, min(before + budget - loop.work, loop.left))[1]
         if rule.starts > best.rule.starts and found:
             # On the mesh from which the best came no other starts were made.
             known = best.solved

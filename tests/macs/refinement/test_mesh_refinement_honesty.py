@@ -193,9 +193,11 @@ def test_a_control_of_low_order_gets_what_a_mixed_constraint_needs():
 
 
 @pytest.mark.slow
-def test_short_pulses_that_a_coarse_mesh_cannot_show_are_found():
+@pytest.mark.parametrize("seed", [0, 9, 27])
+def test_short_pulses_that_a_coarse_mesh_cannot_show_are_found(seed):
     """Twelve switches, of pulses down to 0.06 of 11.9 seconds. Without some of them, simulations and finer meshes of the same kind agree on
-    11.54; an independent mesh, of 200 equal elements with constant controls, has 11.4689."""
-    point = optimize(random_problem(4), objective="miss")
+    11.54, as do all starts on the coarse mesh with seeds 9 and 27; an independent mesh, of 200 equal elements with constant controls, has
+    11.4689."""
+    point = optimize(random_problem(4), objective="miss", seed=seed)
     # A note may say that another mesh had 1e-4 of this less: the independent one is further off.
     assert point.verified and point.simulated["miss"] < 11.4689
