@@ -11,7 +11,7 @@ import math
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any, NoReturn, TypeVar
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from . import checks
 from .compiled import Limit, Objective, Variable, kinds
+from .limited import LimitedRows
 
 
 def without_dynamics(name: str) -> str:
@@ -236,6 +237,7 @@ class VectorProblem:
         self._constraints: dict[str, Limit] = {}
         self._function: Callable[..., Mapping[str, Any]] | None = None
         self._by_row = False
+        self._limit: float | None = None
 
     def __repr__(self) -> str:
         return f"VectorProblem('{self.name}', variables=[{', '.join(self._variables)}], objectives=[{', '.join(self._objectives)}])"
@@ -315,14 +317,21 @@ class VectorProblem:
         self._function = function
         return function
 
-    def row(self, function: Any) -> Any:
+    def row(self, function: Any = None, *, limit: float | None = None) -> Any:
         """Say what computes one design: a decorator, in place of `function`. Returns the function as it is.
 
         It takes a dict with the value of each variable by its name: a float, an int, or what was chosen. It returns a dict with a number
         for each objective and constraint; what else is in it is ignored. A design at which it raises an error, or returns NaN or None, is
         a failed evaluation. With `workers=` designs are computed side by side.
+
+        `limit`, as in `@problem.row(limit=60)`: seconds after which a design has failed. Designs are then computed in a process of their
+        own, which is killed and replaced; one that ends its process has failed, too.
         """
-        self._function, self._by_row = self.function(function), True
+        if limit is not None:
+            checks.check_positive(f"problem '{self.name}': the limit of a row", limit)
+        if function is None:
+            return partial(self.row, limit=limit)
+        self._function, self._by_row, self._limit = self.function(function), True, limit
         return function
 
     def compile(self) -> CompiledVectorProblem:
@@ -342,12 +351,13 @@ class VectorProblem:
             raise ValueError(f"{place} has no function; give it one with @problem.function")
         variables, names = tuple(self._variables.values()), (*self._objectives, *self._constraints)
         function = ByRow(self._function, variables, names) if self._by_row else self._function
+        rows: Rows = NamedRows(place, function, tuple(self._objectives), tuple(self._constraints))
         return CompiledVectorProblem(
             name=self.name,
             variables=variables,
             goals=tuple(self._objectives.values()),
             limits=tuple(self._constraints.values()),
-            rows=NamedRows(place, function, tuple(self._objectives), tuple(self._constraints)),
+            rows=rows if self._limit is None else LimitedRows(rows, self._limit),
             address=self.address,
             data=dict(self.data),
             by_row=self._by_row,

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import logging
+import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from problems.checks import check_text, choices, interval, shown, unknown, whole
 from problems.compiled import Objective, Variable
-from problems.vector import SAMPLED, CompiledVectorProblem, filled, is_of_statement, real_numbers
+from problems.vector import SAMPLED, CompiledVectorProblem, Row, filled, is_of_statement, real_numbers
 from transcription.stopping import Stopped
 from transcription.trajectories.limits import excess
 
@@ -21,6 +23,47 @@ from ..io.workers import each
 from .evaluator import CONVERGED, FAILED, INFEASIBLE, Counts, Evaluation, Evaluator, masks
 
 log = logging.getLogger(__name__)
+
+
+class RowCache(sqlite3.Connection):
+    """Objectives (1, m), all minimised, and residuals (1, c) of rows of one problem, in a file of SQLite that one process has open.
+
+    A row is known by the problem's fingerprint and its exact values. What is kept are numbers, which nothing executes. A batch is written
+    whole or not at all, wherever the process is killed. ValueError for another file, or one in use.
+    """
+
+    ID = 7_725_301  # `PRAGMA application_id` of these files
+
+    def __init__(self, path: str | PathLike[str], problem: str) -> None:
+        self._problem = problem
+        try:
+            super().__init__(path, timeout=1.0)
+            self.execute("PRAGMA locking_mode = EXCLUSIVE")
+            self.execute("BEGIN EXCLUSIVE")
+            if self.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,):
+                self.execute(f"PRAGMA application_id = {self.ID}")
+                self.execute("CREATE TABLE rows (problem, row, objectives, residuals, PRIMARY KEY (problem, row)) WITHOUT ROWID")
+            own = self.execute("PRAGMA application_id").fetchone() == (self.ID,)
+            self.commit()
+        except sqlite3.OperationalError as error:
+            raise ValueError(f"cache: '{path}' cannot be used, perhaps since another search does: {error}") from None
+        except sqlite3.DatabaseError:
+            own = False
+        if not own:
+            raise ValueError(f"cache: '{path}' is no cache of rows")
+
+    def known(self, X: np.ndarray) -> dict[int, Row]:
+        """What is known of rows X (k, d), by their numbers."""
+        asked = "SELECT objectives, residuals FROM rows WHERE problem = ? AND row = ?"
+        found = {i: self.execute(asked, (self._problem, row.tobytes())).fetchone() for i, row in enumerate(X)}
+        return {i: (np.frombuffer(one[0])[None], np.frombuffer(one[1])[None]) for i, one in found.items() if one is not None}
+
+    def add(self, X: Sequence[np.ndarray], values: Sequence[Row]) -> None:
+        """Keep the values of rows (d,) that did not raise an error: they may succeed another time, with a licence or more time."""
+        kept = [(row, one) for row, one in zip(X, values, strict=True) if not isinstance(one, str)]
+        with self:
+            data = [(self._problem, row.tobytes(), *(part.tobytes() for part in one)) for row, one in kept]
+            self.executemany("INSERT OR REPLACE INTO rows VALUES (?, ?, ?, ?)", data)
 
 
 class BlackBox(Evaluator):
@@ -33,7 +76,7 @@ class BlackBox(Evaluator):
     centre of the box, which is counted. ValueError where the result of a function has the wrong type or shape; the message names it.
     """
 
-    def __init__(self, problem: CompiledVectorProblem, tolerance: float = 1e-6, apart: bool = False) -> None:
+    def __init__(self, problem: CompiledVectorProblem, tolerance: float = 1e-6, apart: bool = False, cache: RowCache | None = None) -> None:
         if not (isinstance(tolerance, int | float) and 0 <= tolerance < np.inf):
             raise ValueError(f"tolerance: must be a number >= 0, not {tolerance!r}")
         plain = problem.limits is None
@@ -45,10 +88,8 @@ class BlackBox(Evaluator):
         self.free = np.arange(len(problem.variables))
         self.kinds = masks(problem.variables)
         self.known_designs: dict[bytes, np.ndarray] = {}
-        self.apart, self._alike = (
-            apart or problem.by_row,
-            apart,
-        )  # whether rows are evaluated by themselves, with one thread as in processes
+        self.apart = apart or problem.by_row or cache is not None  # whether each row is evaluated by itself
+        self._alike, self._cache = apart, cache  # whether rows have one thread of BLAS, as they have in processes
         self._columns: Sequence[int] = (len(problem.goals), len(problem.limits)) if problem.goals and problem.limits is not None else ()
         self._why: dict[int, str] = {}  # of the last batch, why rows failed
         self._failing = 0  # evaluations that failed since the last one that did not
@@ -112,13 +153,23 @@ class BlackBox(Evaluator):
                     if isinstance(error, Stopped | MemoryError) or is_of_statement(error):
                         raise
                     found = []
-                found = found or each(CompiledVectorProblem.attempt, self.problem, [(row, "evaluate", (Stopped,)) for row in Z])
+                found = found or self._each(Z)
         except KeyboardInterrupt:
             raise Stopped("interrupted") from None
         self._why = {i: one for i, one in enumerate(found) if isinstance(one, str)}
         F, residuals = filled(found, self._columns, self.problem.named(Z[0]))
         self._columns = F.shape[1], residuals.shape[1]
         return F, residuals
+
+    def _each(self, Z: np.ndarray) -> list[Row]:
+        """What the function gives for each of the rows (k, d) by itself, if the cache does not know."""
+        known = {} if self._cache is None else self._cache.known(Z)
+        left = [row for i, row in enumerate(Z) if i not in known]
+        found = each(CompiledVectorProblem.attempt, self.problem, [(row, "evaluate", (Stopped,)) for row in left])
+        if self._cache is not None:
+            self._cache.add(left, found)
+            self.counts.from_cache += len(known)
+        return [known[i] if i in known else found.pop(0) for i in range(len(Z))]
 
     def room(self, Z: np.ndarray, left: int) -> int:
         """See `Evaluator.room`."""

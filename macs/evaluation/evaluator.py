@@ -230,6 +230,7 @@ class Counts:
     solves_for: Counter[str] = field(default_factory=Counter)
     iterations_for: Counter[str] = field(default_factory=Counter)
     kept_for: Counter[str] = field(default_factory=Counter)
+    from_cache: int = field(default=0)  # evaluations whose values a cache of rows had
     first_failure: str = ""  # of an evaluation of a vector problem: the error, and the design
 
     __repr__ = short_repr

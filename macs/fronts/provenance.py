@@ -141,7 +141,7 @@ COUNTED_BY = ("solves_for", "iterations_for", "kept_for")
 
 def costs(counts: Counts, **about: Any) -> dict[str, Any]:
     """`stats` of a front from the counts of a run, with `about`: `wall_time`, `seed`, `tolerance` and more."""
-    first = {"first_failure": counts.first_failure} if counts.first_failure else {}
+    first = {key: one for key in ("from_cache", "first_failure") if (one := getattr(counts, key))}
     by = {key: dict(getattr(counts, key)) for key in (*COUNTED_BY, "failures")}
     return {**{key: getattr(counts, key) for key in COUNTED}, **by, **first, **about}
 

@@ -203,6 +203,8 @@ def footer(front: Points) -> list[str]:
     bad = int((front.status != CONVERGED).sum())
     if bad:
         lines.append(f"{bad} of {counted(len(front), 'point')} did not converge.")
+    if front.stats.get("from_cache"):
+        lines.append(f"Of {counted(front.stats['evaluations'], 'evaluation')}, {front.stats['from_cache']} came from the cache.")
     if first := front.stats.get("first_failure"):
         lines.append(f"{counted(front.stats['failures'].get(FAILED, 0), 'evaluation')} failed; the first: {first}.")
     if front.stats["fallbacks"]:

@@ -304,7 +304,7 @@ class MultistartSolver:
         lower, upper = self.nlp.lower[integers], self.nlp.upper[integers]
         few = np.prod(upper - lower + 1.0) <= MULTISTART.values[0]
         if few:
-            new = [*product(*(range(int(low), int(high) + 1) for low, high in zip(lower, upper, strict=True)))]
+            new = [*product(*(np.arange(low, high + 1.0) for low, high in zip(lower, upper, strict=True)))]
         else:
             new = [tuple(self.solves(self.nlp.relaxed, best.z, task).z[integers].round())]
         tried, steps = {tuple(best.z[integers])}, np.vstack([np.eye(len(integers)), -np.eye(len(integers))])
@@ -322,9 +322,7 @@ class MultistartSolver:
         """The best known feasible vector (n,) with these whole numbers, else this one with them."""
         same = (self._known.Z[:, self.nlp.integers] == value).all(axis=1)
         merits = np.where(same, self.merits(task, self._known.F, self._known.violation, strict=True), np.inf)
-        if np.isfinite(merits).any():
-            return self._known.Z[np.argmin(merits)]
-        return self._with(self.nlp.integers, z, value)
+        return self._known.Z[np.argmin(merits)] if (merits < np.inf).any() else self._with(self.nlp.integers, z, value)
 
     def single(self, i: int) -> Solved:
         """The optimum of objective i alone. A solve from the best known vector may fail if that is an optimum of another objective within

@@ -215,12 +215,12 @@ def _with_other_values(archive: Archive, solves: BudgetedSolves) -> Archive:
     for _ in range(POLISH.rounds):
         weights, ends = np.tile(span, (len(archive), 1)), extremes(archive.F)
         weights[ends, np.arange(m)] = 0.0 if m > 1 else span
-        pairs = [(i, z) for i in range(len(archive) if solves.left else 0) for z in solves.neighbours(archive.Z[i])]
-        if not pairs:
+        near = [solves.neighbours(z) for z in archive.Z] if solves.left else []
+        if not (count := sum(map(len, near))):
             break
-        rows = np.array([i for i, _ in pairs])
-        solves.promise(len(rows))
-        found = solves(np.array([z for _, z in pairs]), archive.F[rows], weights[rows])
+        solves.promise(count)
+        rows = np.repeat(np.arange(len(near)), [len(one) for one in near])
+        found = solves(np.vstack(near), archive.F[rows], weights[rows])
         change = (archive.F[rows] - found.F) / span
         gained = (found.status == CONVERGED) & (change.min(axis=1) >= -BETTER) & (change.max(axis=1) > BETTER)
         solves.results.keep(gained)

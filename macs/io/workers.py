@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
-import signal
 import tempfile
 import threading
 import time
@@ -26,6 +25,7 @@ from typing import Any, TypeVar
 
 import cloudpickle
 
+from problems.limited import begin_process
 from transcription.stopping import stopped_by, stopping
 
 from .interrupts import work_on_trajectories
@@ -107,8 +107,7 @@ class Helpers:
         lock, ready = threading.RLock(), 0
 
         def feed(done: Future[Any] | None = None) -> None:
-            """Give pieces to the processes that are ready: one each, and a next one as long as many are left; again as soon as one is done,
-            since this process may be at work on a long piece. Else it takes one itself."""
+            """Give pieces to the processes that are ready, one each, and a next one as long as many are left; again once one is done."""
             with lock:
                 if done is not None and (done.cancelled() or done.exception() is not None):
                     return
@@ -200,7 +199,7 @@ class Helpers:
         if self._executor is None:
             from loky import ProcessPoolExecutor
 
-            self._executor = ProcessPoolExecutor(max_workers=self._count, timeout=300.0, initializer=_begin, initargs=(os.getpid(),))
+            self._executor = ProcessPoolExecutor(max_workers=self._count, timeout=300.0, initializer=begin_process, initargs=(os.getpid(),))
         try:
             return self._executor.submit(do, *arguments)
         except BrokenProcessPool as error:  # since the last piece
@@ -256,15 +255,3 @@ def _perform(digest: str, data: bytes, piece: tuple[Any, ...], stop: str) -> Any
         _learn(digest, data)
         do, shared = _KEPT[digest]
         return do(shared, *piece)
-
-
-def _begin(parent: int) -> None:
-    """Begin a process: Ctrl-C is for the one that began it, and with that one it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()

@@ -123,11 +123,11 @@ def count(progress: Progress) -> str:
 
 
 def clock(progress: Progress) -> str:
-    """Elapsed and estimated remaining time, such as 0:12, 1:03 left."""
-    if progress.budget is None or not 0 < progress.evaluations < progress.budget:
+    """Elapsed time, evaluations a second and estimated remaining time, such as 0:12, 410 a second, 1:03 left."""
+    if progress.budget is None or not 0 < progress.evaluations < progress.budget or not progress.elapsed:
         return minutes(progress.elapsed)
-    left = progress.elapsed * (progress.budget - progress.evaluations) / progress.evaluations
-    return f"{minutes(progress.elapsed)}, {minutes(left)} left"
+    each = progress.elapsed / progress.evaluations
+    return f"{minutes(progress.elapsed)}, {1.0 / each:.3g} a second, {minutes(each * (progress.budget - progress.evaluations))} left"
 
 
 def found(progress: Progress) -> list[str]:

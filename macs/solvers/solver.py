@@ -6,6 +6,7 @@ import importlib
 import inspect
 import logging
 from collections.abc import Callable, Sequence
+from contextlib import closing, nullcontext
 from dataclasses import asdict, replace
 from os import PathLike
 from typing import Any
@@ -22,7 +23,7 @@ from transcription.smooth import Smooth
 from transcription.stopping import Stopped
 
 from ..evaluation.bilevel import Bilevel
-from ..evaluation.blackbox import BlackBox, plain_problem
+from ..evaluation.blackbox import BlackBox, RowCache, plain_problem
 from ..evaluation.evaluator import Counts
 from ..front import Front
 from ..fronts.builders import from_archive, from_vector_problem, no_points
@@ -73,6 +74,7 @@ class Solver(SearchMethod):
         progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
+        cache: str | PathLike[str] | None = None,
     ) -> Front:
         """The Pareto front of an optimal control problem or a vector problem.
 
@@ -119,6 +121,9 @@ class Solver(SearchMethod):
         checkpoint : path, optional
             File that keeps the state of the run. The same call continues a run that was killed, interrupted, out of time or stopped by the
             callback, and gives the same front as without the interruption, to the last bit. See Notes.
+        cache : path, optional
+            File that keeps the rows of a vector problem, evaluated one at a time, for any later search on it. Those that it has count as
+            evaluations, and in `stats["from_cache"]`; those that raised an error are tried again.
 
         Returns
         -------
@@ -162,9 +167,11 @@ class Solver(SearchMethod):
         """
         if not isinstance(problem, VectorProblem | CompiledVectorProblem):
             check_problem(problem, transcription)
+            if cache is not None:
+                raise ValueError(f"cache is for rows of vector problems, and '{problem.name}' has trajectories: use checkpoint")
         elif transcription is not None or inner is not None:
             raise ValueError(f"{without_dynamics(problem.name)}: it takes no {'inner level' if transcription is None else 'transcription'}")
-        call = Call(self._budget(problem, evaluations), seed, tolerance, time_limit, workers, progress, callback, checkpoint)
+        call = Call(self._budget(problem, evaluations), seed, tolerance, time_limit, workers, progress, callback, checkpoint, cache)
         check_verify(verify)
         if isinstance(problem, VectorProblem | CompiledVectorProblem):
             return self._solve_vector(problem.compile(), start, verify, call)
@@ -266,6 +273,7 @@ class Solver(SearchMethod):
         progress: bool | None = None,
         callback: Callback | None = None,
         checkpoint: str | PathLike[str] | None = None,
+        cache: str | PathLike[str] | None = None,
     ) -> Front:
         """The Pareto front of a plain vector function or a pymoo Problem.
 
@@ -286,8 +294,8 @@ class Solver(SearchMethod):
             Names, units and senses ("minimize" or "maximize") of the objectives. Default: "f1", "f2", ..., no units, all minimised.
         integer : bool or sequence of str
             Whether all variables, or those of these names, are whole numbers; of a pymoo Problem, beside its own. For choices: `solve`.
-        seed, start, time_limit, workers, progress, callback, checkpoint
-            As for `solve`. With `workers`, also 1, the function gets one row at a time. A checkpoint knows only
+        seed, start, time_limit, workers, progress, callback, checkpoint, cache
+            As for `solve`. With `workers`, also 1, or a `cache`, the function gets one row at a time. A checkpoint knows only
             bounds and names of a function, so the caller must pass the same function again.
 
         Returns
@@ -301,7 +309,7 @@ class Solver(SearchMethod):
         OSError
             If the checkpoint cannot be written; before any work.
         """
-        call = Call(self._budget(None, evaluations), seed, tolerance, time_limit, workers, progress, callback, checkpoint)
+        call = Call(self._budget(None, evaluations), seed, tolerance, time_limit, workers, progress, callback, checkpoint, cache)
         problem = plain_problem(function, bounds, constraints=constraints, names=names, units=units, senses=senses, integer=integer)
         what = {
             "bounds": {v.name: (v.lower, v.upper) for v in problem.variables},
@@ -340,7 +348,8 @@ class Solver(SearchMethod):
 
     def _search_vector(self, problem: CompiledVectorProblem, start: Any, call: Call, what: dict[str, Any]) -> Front:
         """The front of a vector problem as a search leaves it; `what` says for its checkpoint which problem that is."""
-        box, about = BlackBox(problem, call.tolerance, apart=call.workers is not None), self.about()
+        cache = None if call.cache is None else RowCache(call.cache, problem.fingerprint)
+        box, about = BlackBox(problem, call.tolerance, apart=call.workers is not None, cache=cache), self.about()
         if problem.goals:
             self.check_objectives(len(problem.goals))
             self.check_goals(problem.goals)
@@ -352,7 +361,7 @@ class Solver(SearchMethod):
             return Front.of(from_vector_problem(problem, state.archive, state.closest, box.goals, about, stats))
 
         first = None if start is None else decisions(start, problem.variables)
-        with processes(call.workers):
+        with processes(call.workers), closing(cache) if cache else nullcontext():
             return SearchRun(self, box, make_front, call, first, {"solver": about, **what}).go()
 
 

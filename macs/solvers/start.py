@@ -45,11 +45,12 @@ class Call:
     progress: bool | None = None
     callback: Callable[[Progress], Any] | None = None
     checkpoint: str | PathLike[str] | None = None
+    cache: str | PathLike[str] | None = None
 
     def __post_init__(self) -> None:
         if self.evaluations is not None:
             check_count("evaluations", self.evaluations, 1)
-        seed, checkpoint = self.seed, self.checkpoint
+        seed = self.seed
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
             raise ValueError(f"seed must be a whole number of at least 0, or None, not {seed!r}")
         check_positive("tolerance", self.tolerance)
@@ -59,10 +60,11 @@ class Call:
         check_workers(self.workers)
         if self.callback is not None and not callable(self.callback):
             raise ValueError(f"callback must be callable, not {self.callback!r}")
-        if checkpoint is not None:
-            if not isinstance(checkpoint, str | PathLike) or not str(checkpoint):
-                raise ValueError(f"checkpoint must be a path, not {checkpoint!r}")
-            check_target(checkpoint)
+        for name, path in (("checkpoint", self.checkpoint), ("cache", self.cache)):
+            if path is not None and not (isinstance(path, str | PathLike) and str(path)):
+                raise ValueError(f"{name} must be a path, not {path!r}")
+            if path is not None:
+                check_target(path)
 
 
 def drawing(start: Any) -> Smooth | str | None:

@@ -28,13 +28,13 @@ def test_plain_lines_come_now_and_then_and_at_the_end():
     assert stream.getvalue() == ""
     with SearchDisplay(stream=stream) as display:
         display.update(standing(archive=0))
-    assert stream.getvalue() == "1 200 / 10 000 evaluations, 0:12, 1:28 left, no feasible point yet\n"
+    assert stream.getvalue() == "1 200 / 10 000 evaluations, 0:12, 100 a second, 1:28 left, no feasible point yet\n"
     stream = io.StringIO()
     with SearchDisplay(stream=stream) as display:
         display.update(replace(standing(10_000), gradient_solves=31))
     assert stream.getvalue().startswith("10 000 / 10 000 evaluations, 0:12, 31 gradient solves, archive 4")
     assert [minutes(s) for s in (0, 59.6, 61, 7205)] == ["0:00", "1:00", "1:01", "2:00:05"]
-    assert clock(standing(0)) == "0:12" and clock(standing(5000)) == "0:12, 0:12 left" and clock(standing(10_000)) == "0:12"
+    assert clock(standing(0)) == "0:12" and clock(standing(5000)) == "0:12, 417 a second, 0:12 left" and clock(standing(10_000)) == "0:12"
     assert count(standing()) == "1 200 / 10 000 evaluations"
 
 
