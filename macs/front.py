@@ -27,7 +27,7 @@ from .io.workers import Workers, processes
 from .pareto.dominance import normalised
 from .refinement.front_refinement import refine_mesh
 from .refinement.mending import mended
-from .refinement.places import dense_front, nearest_point, point_at
+from .refinement.places import dense_curve, dense_front, nearest_point, point_at
 
 if TYPE_CHECKING:
     import xarray
@@ -148,22 +148,32 @@ class Front(Points):
         """
         return nearest_point(self, reference)[0]
 
-    def dense(self, n: int, *, time_limit: float | None = None, workers: Workers | None = None, progress: bool | None = None) -> Front:
+    def dense(
+        self,
+        n: int | None = None,
+        *,
+        error: float | None = None,
+        time_limit: float | None = None,
+        workers: Workers | None = None,
+        progress: bool | None = None,
+    ) -> Front:
         """A front of n points, solved from their neighbours as by `at`: of two objectives in even steps along the line between the ends, of
         more on a lattice on the simplex between these, and at most n. `message` says how many places have no point of their own, as in a
         gap.
 
         Parameters
         ----------
-        n : int
+        n : int, optional
             The ends of this front included.
+        error : float, optional
+            Instead of n, with two objectives: these points, and as many between them as it takes until the error of their `curve` is less.
         time_limit, workers, progress
             As for `optimize`.
 
         Raises
         ------
         ValueError
-            As for `at`; also for fewer points than objectives.
+            As for `at`; also for fewer points than objectives, both or neither of n and error, and where there is no `curve`.
 
         Examples
         --------
@@ -172,7 +182,10 @@ class Front(Points):
         >>> len(dense), bool(dense.verified.all())
         (9, True)
         """
-        return Front.of(dense_front(self, n, time_limit, progress, workers))
+        if (n is None) == (error is None):
+            raise ValueError("dense takes either a number of points or error=, what the curve may err by")
+        call = time_limit, progress, workers
+        return Front.of(dense_front(self, n or 0, *call) if error is None else dense_curve(self, error, *call))
 
     def refine(
         self,

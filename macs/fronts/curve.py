@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -98,15 +99,16 @@ class FrontCurve:
         """The same between the nodes of each piece."""
         return tuple(part.errors for part in self.parts)
 
+    def wanting(self, error: float, tried: Sequence[float]) -> list[float]:
+        """The middles, but for those that were tried, of where the curve errs by more, those of the largest errors first."""
+        ends = [zip(pairwise(part.places.tolist()), part.errors.tolist(), strict=True) for part in self.parts]
+        found = [(-estimate, 0.5 * (start + end)) for part in ends for (start, end), estimate in part if estimate > error]
+        return [place for _, place in sorted(found) if not np.isclose(place, tried).any()]
+
     @property
     def pieces(self) -> np.ndarray:
         """Objectives (k, 2, 2) at both ends of each piece, in the user's units and senses."""
         return np.array([self._objectives(part.places[[0, -1]], part.heights[[0, -1]]) for part in self.parts])
-
-    @property
-    def intervals(self) -> np.ndarray:
-        """Places (k, 2) at which pieces begin and end, in [0, 1]."""
-        return np.array([part.interval for part in self.parts])
 
     def sample(self, count: int = 200) -> np.ndarray:
         """Objectives (k, 2) at about so many places along the curve, in the user's units and senses, with a row of NaN in each gap."""

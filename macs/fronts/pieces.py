@@ -143,19 +143,15 @@ def _split(run: _Run) -> list[_Run]:
         return [run]
     known = run.known()
     errors = [known.error(i) for i in range(n - 1)]
-    best: tuple[float, list[_Run]] = (FIT.better, [])
-    for i in range(1, n - 2):
-        best = min(best, _between(run, known, i, errors[i]), key=lambda one: one[0])
-    for i in range(2, n - 2):
-        best = min(best, _at_point(run, known, i, max(errors[i - 1], errors[i])), key=lambda one: one[0])
-    return [run] if not best[1] else [part for one in best[1] for part in _split(one)]
+    breaks = [_between(run, known, i, errors[i]) for i in range(1, n - 2) if errors[i] > 10 * BETTER]
+    breaks += [_at_point(run, known, i, one) for i in range(2, n - 2) if (one := max(errors[i - 1], errors[i])) > 10 * BETTER]
+    left, parts = min(breaks, key=lambda one: one[0], default=(np.inf, []))
+    return [part for one in parts for part in _split(one)] if left < FIT.better else [run]
 
 
 def _between(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list[_Run]]:
     """What a break between points i and i + 1 leaves of the error of a smooth curve, and the two parts."""
     nothing = np.inf, list[_Run]()
-    if smooth <= 10 * BETTER:
-        return nothing
     start, end = known.s[i], known.s[i + 1]
     (left, left_rival), (right, right_rival) = known.side(i, -1), known.side(i + 1, 1)
     places = np.linspace(start, end, 257)
@@ -198,8 +194,6 @@ def _admissible(one: Polynomial, places: np.ndarray) -> float:
 
 def _at_point(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list[_Run]]:
     """The same for a break at point i, whose slope may be one of several."""
-    if smooth <= 10 * BETTER:
-        return np.inf, []
     slopes, unsure = [], []
     for step in (-1, 1):
         near, far = i + step, i + 2 * step

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.checks import check_count
+from problems.checks import check_count, check_interval
 from problems.sampling import refuse_peaks
 from transcription import from_dict
 from transcription.base import NLP, Transcription
@@ -22,7 +22,8 @@ from transcription.stopping import Stopped, stopping
 from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED, Counts
-from ..fronts.builders import certified, from_vectors
+from ..fronts.builders import best_rows, certified, from_vectors
+from ..fronts.curve import curve_of
 from ..fronts.points import Points
 from ..fronts.provenance import costs, more_costs
 from ..fronts.verified import VERIFY, objective_scales, verified
@@ -32,6 +33,7 @@ from ..gradients.scalarised import GradientSolves, Scalarised, Start, best_of, s
 from ..io.console import working
 from ..io.interrupts import work_on_trajectories
 from ..io.workers import TOGETHER, Workers, each
+from ..pareto.directions import LATTICE_SIZE
 from ..pareto.dominance import BETTER, distinct, extremes, ranges, separate
 from ..preferences.ranges import confidence, named_numbers, named_weights, places, shown
 from .mending import resolve_unverified
@@ -88,6 +90,27 @@ def dense_front(front: Points, n: int, time_limit: float | None, progress: bool 
         points = known.dense(n, show)
         elapsed, stopped = interrupts.elapsed, interrupts.reason
     return points.replace(stats=more_costs(front.stats, known.counts, elapsed, stopped))
+
+
+def dense_curve(front: Points, error: float, time_limit: float | None, progress: bool | None, workers: Workers | None) -> Points:
+    """The front with as many points more as its curve takes to err by less; see `Front.dense`."""
+    check_interval("error", error, "(0, 1]")
+    points, curve, counts, tried = front, curve_of(front), Counts(), list[float]()
+    with working(time_limit, progress, workers) as (show, interrupts), suppress(Stopped):
+        while (places := curve.wanting(error, tried)) and len(points) < LATTICE_SIZE and not stopping():
+            show(f"dense: {len(points)} points, of which the curve errs by about {curve.error:.1e}")
+            known, tried = KnownPoints(points), tried + places
+            lines = [curve.least + curve.ranges * np.array([place, 1.0 - place]) for place in places]
+            new = [
+                one for one in known.solved_all([Scalarised(line, curve.ranges, units=known.units) for line in lines]) if one.row is None
+            ]
+            counts = counts.joined(known.counts)
+            points = Points.concatenate([points, known.found(new)]) if new else points
+            points = points[best_rows(points)].sorted()
+            curve = curve_of(points)
+    missed = f"The curve errs by about {curve.error:.1e} of the ranges, and not by less than {error:g}." if curve.error > error else ""
+    stats = more_costs(front.stats, counts, interrupts.elapsed, interrupts.reason)
+    return points.replace(stats=stats, message=" ".join(filter(None, [front.message, missed])))
 
 
 @dataclass(frozen=True, eq=False)

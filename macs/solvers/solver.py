@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.checks import unknown
+from problems.checks import check_interval, unknown
 from problems.compiled import CompiledProblem, kinds
 from problems.problem import Problem
 from problems.vector import CompiledVectorProblem, VectorProblem, without_dynamics
@@ -69,6 +69,7 @@ class Solver(SearchMethod):
         tolerance: float = 1e-6,
         start: Any = None,
         verify: float | None = VERIFY,
+        error: float | None = None,
         time_limit: float | None = None,
         workers: Workers | None = None,
         progress: bool | None = None,
@@ -106,6 +107,9 @@ class Solver(SearchMethod):
         verify : float, optional
             How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: points are not
             simulated.
+        error : float, optional
+            With two objectives: after the search, gradient solves add points between those found until the curve of the front errs by
+            less, in ranges; see `Front.curve` and `Front.dense`.
         time_limit : float, optional
             Seconds after which the call ends with its results so far, as it does after Ctrl-C: within a second or two, whatever it is
             doing. The last quarter is left for simulations, and for solving again what these do not confirm. A run that this ends is
@@ -173,12 +177,20 @@ class Solver(SearchMethod):
             raise ValueError(f"{without_dynamics(problem.name)}: it takes no {'inner level' if transcription is None else 'transcription'}")
         call = Call(self._budget(problem, evaluations), seed, tolerance, time_limit, workers, progress, callback, checkpoint, cache)
         check_verify(verify)
+        check_interval("error", 1.0 if error is None else error, "(0, 1]")
+        if error is not None and (isinstance(problem, VectorProblem | CompiledVectorProblem) or len(problem.compile().goals) != 2):
+            raise ValueError(f"error is for two objectives and trajectories, which '{problem.name}' has not")
         if isinstance(problem, VectorProblem | CompiledVectorProblem):
             return self._solve_vector(problem.compile(), start, verify, call)
         if isinstance(problem, Problem):
             inner, start = problem.default_inner if inner is None else inner, problem.default_start if start is None else start
         with spending("search") as seconds:
             front = self._solve(problem, transcription, "auto" if inner is None else inner, start, verify, call)
+            if error is not None and front.stats["stopped"] in ENDED:
+                try:
+                    front = front.dense(error=error, workers=workers, progress=progress)
+                except ValueError as reason:  # after a long search
+                    front = front.replace(message="; ".join(filter(None, [front.message, str(reason)])))
         if sum(seconds.values()) <= 10.0:  # of a short run they say little
             return front
         return front.replace(stats=front.stats | {"seconds": {what: round(one, 2) for what, one in seconds.items()}})

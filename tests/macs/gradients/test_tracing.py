@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 from smooth_problems import corners, still, two_wells
 
-from macs import Front, sweep
+from macs import MACS, Front, sweep
 from macs.fronts.curve import GAPS
 from problems import Problem
 from transcription import DFET
@@ -98,3 +98,22 @@ def test_an_error_and_a_number_of_points_exclude_each_other():
 def test_what_was_not_reached_is_told(monkeypatch):
     monkeypatch.setattr("macs.gradients.tracing.LATTICE_SIZE", 5)
     assert "the curve errs by about" in sweep(two_wells(), MESH, error=1e-6, starts=1).message
+
+
+def test_any_front_gets_points_until_its_curve_errs_by_less():
+    few = sweep(two_wells(), MESH, points=4, starts=1)
+    found = few.dense(error=1e-3)
+    assert few.curve().error > 1e-3 and found.verified.all() and 5 <= len(found) <= 16
+    assert found.curve().distances(np.column_stack([X**2, (X - 1) ** 2])).max() <= found.curve().error < 1e-3
+    assert found.stats["gradient_solves"] > few.stats["gradient_solves"]
+    with pytest.raises(ValueError, match="either a number of points or error="):
+        few.dense(5, error=1e-3)
+
+
+def test_a_search_goes_on_until_its_curve_errs_by_less():
+    found = MACS(archive=4).solve(two_wells(), MESH, evaluations=100, seed=1, error=2e-3)
+    assert found.curve().error < 2e-3 and found.verified.all() and found.solver["name"] == "MACS"
+    without = MACS(archive=4, refine=False).solve(two_wells(), MESH, evaluations=60, seed=1, error=1e-2)
+    assert len(without) and "whose weights are its slopes" in without.message
+    with pytest.raises(ValueError, match="error is for two objectives and trajectories, which 'corners' has not"):
+        MACS().solve(corners(), MESH, error=1e-2)
