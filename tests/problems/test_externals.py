@@ -187,3 +187,49 @@ def test_functions_for_real_numbers_and_of_one_row_work_with_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         ascent(real, derivatives="finite").compile()
+
+
+def glide(table):
+    """A glide from 60 km whose lift and drag come from a table (angle of attack, Mach number)."""
+    problem = Problem("glide")
+    phase = problem.phase("glide", t0=0, tf=(200, 2500))
+    h = phase.state("h", bounds=(15, 80), initial=60, final=20, unit="km")
+    s = phase.state("range", bounds=(0, 4000), initial=0, unit="km")
+    v = phase.state("v", bounds=(0.3, 5), initial=4.0, final=(0.3, 1.0), unit="km/s")
+    y = phase.state("gamma", bounds=(-1.0, 0.5), initial=-0.02, unit="rad")
+    alpha = phase.control("alpha", bounds=(0, 40), unit="deg")
+    grid = np.linspace(-5.0, 50.0, 12), np.array([0.0, 1, 2, 3, 5, 8, 12, 20, 30])
+    A, M = np.meshgrid(*grid, indexing="ij")
+    lift = (0.025 * A - 0.0002 * A**2 * (A > 0)) * (1 + 0.3 / (1 + M**2))
+    drag = 0.07 + 0.00045 * A**2 * (1 + 0.1 * np.tanh(M / 5)) + 0.06 * np.exp(-((M - 1.2) ** 2))
+    cl, cd = table(grid, lift, drag, [alpha, v / 0.3])
+    r, density = 6371.0 + h, 1.225 * ca.exp(-h / 7.2)
+    gravity, q = 398600.4 / r**2, 0.5 * density * v**2 * 1e3 * 250.0 / 92000.0  # km/s^2
+    phase.dynamics(
+        h=v * ca.sin(y), range=6371.0 * v * ca.cos(y) / r, v=-q * cd - gravity * ca.sin(y),
+        gamma=q * cl / v + (v / r - gravity / v) * ca.cos(y),
+    )
+    problem.maximize("range", phase.final(s), unit="km")
+    problem.minimize("peak heat", phase.peak(18.3 * ca.sqrt(density) * v**3), unit="W/cm^2")
+    return problem
+
+
+def of_scipy(grid, lift, drag, place):
+    from scipy.interpolate import RegularGridInterpolator
+
+    both = RegularGridInterpolator(grid, np.stack([lift, drag], axis=-1), method="cubic", bounds_error=False, fill_value=None)
+    found = external(lambda states, controls, parameters, time: both(states), states=place, derivatives="finite", outputs=["cl", "cd"])
+    return found[0], found[1]
+
+
+def of_casadi(grid, lift, drag, place):
+    return (ca.interpolant("table", "bspline", [*grid], one.ravel(order="F"))(ca.vertcat(*place)) for one in (lift, drag))
+
+
+@pytest.mark.slow
+def test_a_reentry_with_a_table_of_scipy_is_verified_as_with_one_of_casadi():
+    # On DFET(10, 4) both leave the bound of alpha between nodes, and neither is verified.
+    found, known = (optimize(glide(table), objective="peak heat", starts=1) for table in (of_scipy, of_casadi))
+    assert found.verified and known.verified
+    assert found.objectives == pytest.approx(known.objectives, rel=1e-4)
+    assert found.objectives["peak heat"] == pytest.approx(23.058, rel=1e-3)
