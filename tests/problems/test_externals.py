@@ -206,7 +206,9 @@ def glide(table):
     r, density = 6371.0 + h, 1.225 * ca.exp(-h / 7.2)
     gravity, q = 398600.4 / r**2, 0.5 * density * v**2 * 1e3 * 250.0 / 92000.0  # km/s^2
     phase.dynamics(
-        h=v * ca.sin(y), range=6371.0 * v * ca.cos(y) / r, v=-q * cd - gravity * ca.sin(y),
+        h=v * ca.sin(y),
+        range=6371.0 * v * ca.cos(y) / r,
+        v=-q * cd - gravity * ca.sin(y),
         gamma=q * cl / v + (v / r - gravity / v) * ca.cos(y),
     )
     problem.maximize("range", phase.final(s), unit="km")
