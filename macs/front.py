@@ -132,19 +132,12 @@ class Front(Points):
         Parameters
         ----------
         reference : dict
-            Name -> value, for each objective, on either side of the front.
+            Name -> value, for each objective, on either side of the front: `front.nearest({"flight time": 150, "horizontal speed": 0.4})`.
 
         Raises
         ------
         ValueError
             As for `at`; also for an objective without a value.
-
-        Examples
-        --------
-        >>> import macs, problems
-        >>> front = macs.sweep(problems.load("goddard"), points=5, starts=1)
-        >>> front.nearest({"flight time": 150.0, "horizontal speed": 0.4}).verified
-        True
         """
         return nearest_point(self, reference)[0]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
 from textwrap import shorten
@@ -24,10 +25,12 @@ from ..fronts.points import Points
 from ..fronts.verified import VERIFY
 from ..io.atomic import check_target
 from ..io.text import counted
+from ..preferences.achievement import ReferencePoint
 from ..preferences.catalogue import from_dict as preference_from_dict
 from ..preferences.catalogue import to_dict
 from ..preferences.preference import Preference
 from ..preferences.ranges import Ranges, confidence, shown
+from ..refinement.places import achieved
 from .choice import Choice, Turn, choices_table
 from .decide import decide
 from .dialogue_file import FILE_VERSION, FORMAT, ChoiceRecord, DialogueRecord, TurnRecord, packed, read, readable, write
@@ -382,6 +385,12 @@ class Dialogue:
 
     def _chosen(self, preference: Preference) -> Choice:
         known = self.known
+        if self.problem is not None and self.transcription is None and isinstance(preference, ReferencePoint):
+            slopes, hoped = np.array(preference.lines(self.goals, self.ranges)).T
+            with suppress(ValueError):  # of a front with too few points
+                point = achieved(known, hoped * self.front.signs, 1.0 / np.abs(slopes))[0]
+                if point.verified:
+                    return Choice.of(self._own(point), preference, self.ranges)
         if self.problem is not None:
             verify = self.front.stats.get("verify", VERIFY)
             choice = decide(self.problem, self.transcription, preference, ranges=self.ranges, start=known, seed=self.seed, verify=verify)

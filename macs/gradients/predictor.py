@@ -65,12 +65,9 @@ def shares(X: np.ndarray) -> np.ndarray:
     alone = np.eye(len(X))[squares.argmin()]
     if squares.min() == 0.0 or len(X) == 1:
         return alone
-    if X.shape[1] == 1:
-        x = X[:, 0]
-        if not x.min() < 0.0 < x.max():
-            return alone
+    if X.shape[1] == 1 and X.min() < 0.0 < X.max():
+        x, found = X[:, 0], np.zeros(len(X))
         below, above = np.where(x < 0, x, -np.inf).argmax(), np.where(x > 0, x, np.inf).argmin()
-        found = np.zeros(len(x))
         found[[below, above]] = np.array([x[above], -x[below]]) / (x[above] - x[below])
         return found
     scale = np.sqrt(squares.max())

@@ -99,7 +99,7 @@ class ReferencePoint(Preference):
             object.__setattr__(self, "reservation", named_numbers(self.reservation, "the reservation"))
         check_interval("augmentation", self.augmentation, "[0, 1]")
 
-    def _lines(self, goals: Sequence[Objective], ranges: Ranges | None) -> list[tuple[float, float]]:
+    def lines(self, goals: Sequence[Objective], ranges: Ranges | None) -> list[tuple[float, float]]:
         """The slope of a_i and its aspiration, for each goal."""
         spans, lines = needed(ranges, self), []
         reservation = self.reservation or {}
@@ -117,7 +117,7 @@ class ReferencePoint(Preference):
         return lines
 
     def stages(self, goals: Sequence[Objective], ranges: Ranges | None) -> tuple[Stage, ...]:
-        lines = self._lines(goals, ranges)
+        lines = self.lines(goals, ranges)
 
         def distances(J: Sequence[Operand]) -> list[Operand]:
             return [slope * (value - hoped) for value, (slope, hoped) in zip(J, lines, strict=True)]
@@ -128,7 +128,7 @@ class ReferencePoint(Preference):
         return (Stage("achievement", value, lambda J: [distances(J)]),)
 
     def degrees(self, goals: Sequence[Objective], ranges: Ranges | None, objectives: np.ndarray) -> np.ndarray:
-        slopes, hoped = np.array(self._lines(goals, ranges)).T
+        slopes, hoped = np.array(self.lines(goals, ranges)).T
         return 1.0 - slopes * (np.asarray(objectives, dtype=float) - hoped)
 
 

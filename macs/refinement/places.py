@@ -32,9 +32,10 @@ from ..gradients.predictor import Neighbour, coordinates, in_units, multipliers_
 from ..gradients.scalarised import GradientSolves, Scalarised, Start, best_of, strongly_optimal
 from ..io.console import working
 from ..io.interrupts import work_on_trajectories
+from ..io.text import counted
 from ..io.workers import TOGETHER, Workers, each
 from ..pareto.directions import LATTICE_SIZE
-from ..pareto.dominance import BETTER, distinct, extremes, ranges, separate
+from ..pareto.dominance import BETTER, extremes, ranges, separate
 from ..preferences.ranges import confidence, named_numbers, named_weights, places, shown
 from .mending import resolve_unverified
 from .mesh_loop import Programs, latest_programs
@@ -61,7 +62,12 @@ def nearest_point(front: Points, reference: Mapping[str, float]) -> Points:
     if np.isnan(values).any():
         missing = front.names[int(np.isnan(values).argmax())]
         raise ValueError(f"a reference has a value for each objective, and there is none for '{missing}': at(...) takes goals for some")
-    return found_alone(front, lambda known: known.nearest(values * front.signs))
+    return achieved(front, values * front.signs)
+
+
+def achieved(front: Points, reference: np.ndarray, widths: np.ndarray | None = None) -> Points:
+    """The point nearest to a reference (m,) along widths (m,), by default the ranges of the front."""
+    return found_alone(front, lambda known: known.nearest(reference, known.units if widths is None else widths))
 
 
 def _values(front: Points, given: Mapping[str, float]) -> np.ndarray:
@@ -74,11 +80,7 @@ def found_alone(front: Points, solve: Callable[[KnownPoints], KnownPoint]) -> Po
     """One point of a front, by one solve or a few."""
     known = KnownPoints(front)
     with work_on_trajectories():
-        points = known.found([one := solve(known)])
-        if points.verified.all():
-            return points
-        points = resolve_unverified(points, points.stats["verify"])
-        return points.replace(notes=["; ".join(dict.fromkeys(filter(None, [one.note, *points.notes])))])
+        return known.found([solve(known)])
 
 
 def dense_front(front: Points, n: int, time_limit: float | None, progress: bool | None, workers: Workers | None) -> Points:
@@ -101,9 +103,7 @@ def dense_curve(front: Points, error: float, time_limit: float | None, progress:
             show(f"dense: {len(points)} points, of which the curve errs by about {curve.error:.1e}")
             known, tried = KnownPoints(points), tried + places
             lines = [curve.least + curve.ranges * np.array([place, 1.0 - place]) for place in places]
-            new = [
-                one for one in known.solved_all([Scalarised(line, curve.ranges, units=known.units) for line in lines]) if one.row is None
-            ]
+            new = [one for one in known.solved(*(Scalarised(line, curve.ranges, units=known.units) for line in lines)) if one.row is None]
             counts = counts.joined(known.counts)
             points = Points.concatenate([points, known.found(new)]) if new else points
             points = points[best_rows(points)].sorted()
@@ -163,8 +163,7 @@ class KnownPoints:
         # A point that a simulation refutes may promise too much.
         good = [i for i in good if doubt[i] == 0] if sum(doubt[i] == 0 for i in good) > 1 else good
         if len(good) < 2:
-            words = "no feasible point" if not good else "one feasible point"
-            raise ValueError(f"the front has {words}, and so no other point between its points: sweep or MACS().solve find more")
+            raise ValueError(f"the front has {counted(len(good), 'feasible point')}: between two or more there are others")
         self.known = [
             KnownPoint(from_dict(front.transcriptions[i] or {}), front[i].decision, front.F[i], front.trajectories[i], row=i) for i in good
         ]
@@ -181,36 +180,32 @@ class KnownPoints:
         limited = ~np.isnan(limits)
         if not (self.F[:, limited] <= limits[limited]).all(axis=1).any():
             # First as near to the limits as can be.
-            closest = self.solved(Scalarised(np.where(limited, limits, np.inf), self.units, units=self.units))
+            (closest,) = self.solved(Scalarised(np.where(limited, limits, np.inf), self.units, units=self.units))
             self.known.append(closest)
             over = (closest.F - limits)[limited] / self.units[limited]
             if over.max() > BETTER:
                 return replace(closest, note=f"{self._words(limits)} is out of reach: this is the point of the front nearest to it")
         task = Scalarised(np.where(limited, limits, self.F.min(axis=0)), np.where(limited, 0.0, self.units), units=self.units)
-        found = self.solved(task)
+        (found,) = self.solved(task)
         spare = self._words(np.where(limited & (limits - found.F > BETTER * self.units), limits, np.nan))
         return replace(found, note=f"{spare} lies off the front: this point is better, and no worse in the others") if spare else found
 
     def least_sum(self, weights: np.ndarray) -> KnownPoint:
         """The point of the least sum of objectives in their ranges times weights (m,)."""
         reference = np.where(weights > 0, self.F.min(axis=0), np.inf)
-        return self.solved(Scalarised(reference, weights / self.units, units=self.units, summed=True))
+        return self.solved(Scalarised(reference, weights / self.units, units=self.units, summed=True))[0]
 
-    def nearest(self, reference: np.ndarray) -> KnownPoint:
-        """The point nearest to a reference (m,), along the ranges."""
-        task = Scalarised(reference, self.units, units=self.units)
-        found = self.solved(task)
+    def nearest(self, reference: np.ndarray, widths: np.ndarray) -> KnownPoint:
+        """The point nearest to a reference (m,), along widths (m,)."""
+        task = Scalarised(reference, widths, units=widths)
+        (found,) = self.solved(task)
         missed, words = task.loss(found.F), f"{self._words(reference)} lies off the front: this point "
         if abs(missed) <= BETTER:
             return found
         return replace(found, note=f"{words}{'misses it by up to' if missed > 0 else 'is better in all by'} {abs(missed):.2g} of a range")
 
-    def solved(self, task: Scalarised) -> KnownPoint:
-        """The result of a task; the best point that is known where nothing better was found."""
-        return self.solved_all([task])[0]
-
-    def solved_all(self, tasks: Sequence[Scalarised]) -> list[KnownPoint]:
-        """The results of several tasks, side by side."""
+    def solved(self, *tasks: Scalarised) -> list[KnownPoint]:
+        """The results of tasks, side by side; the best point that is known where nothing better was found."""
         pieces = [self._piece(task) for task in tasks]
         found = []
         for task, (method, *_), (solved, columns, counts) in zip(tasks, pieces, each(_solved, self.programs, pieces), strict=True):
@@ -246,15 +241,14 @@ class KnownPoints:
             while waiting and not stopping():
                 show(f"dense: {len(found)} of {n} points")
                 some = self._farthest(waiting)
-                new = [one for one in self.solved_all([waiting[i] for i in some]) if one.row is None]
+                new = [one for one in self.solved(*(waiting[i] for i in some)) if one.row is None]
                 waiting = [one for i, one in enumerate(waiting) if i not in some]
                 found, self.known = found + new, self.known + new
-        F = np.array([one.F for one in found])
-        kept = distinct(F, self.units)
-        kept[kept] = separate(F[kept], self.units)
-        points = self.found([one for one, keep in zip(found, kept.tolist(), strict=True) if keep])
+        points = self.found(found)
+        points = points[best_rows(points)]
+        points = points[separate(points.F, self.units)].sorted()
         missing = n - len(points)
-        return points.sorted().replace(message=f"{missing} of {n} places have no point of their own." if missing else "")
+        return points.replace(message=f"{missing} of {n} places have no point of their own." if missing else "")
 
     def _farthest(self, tasks: Sequence[Scalarised]) -> list[int]:
         """The tasks of the next batch: in turn that whose place is farthest from all points and places before."""
@@ -268,11 +262,11 @@ class KnownPoints:
         return chosen
 
     def found(self, some: Sequence[KnownPoint]) -> Points:
-        """Points, certified and simulated."""
-        front, counts = self.front, self.counts
-        more = {"seed": front.stats["seed"], "tolerance": front.stats["tolerance"], "reproducible": not counts.clocked}
-        stats = costs(counts, wall_time=time.perf_counter() - self._began, **more)
-        about, sets = {"name": "at", "settings": {}}, list[Points]()
+        """Points, certified and simulated; what a simulation does not confirm is solved again."""
+        front, about = self.front, {name: self.front.stats[name] for name in ("seed", "tolerance")}
+        elapsed = time.perf_counter() - self._began
+        stats = costs(self.counts, wall_time=elapsed, reproducible=not self.counts.clocked, **about)
+        solver, sets = {"name": "at", "settings": {}}, list[Points]()
         for method in dict.fromkeys(one.method for one in some):
             mine = [one for one in some if one.method == method]
             old, new = {one.row: one.note for one in mine if one.row is not None}, [one for one in mine if one.row is None]
@@ -281,11 +275,16 @@ class KnownPoints:
             if new:
                 columns = {name: [one.columns.get(name) for one in new] for name in ("optimality", "costates", "weighted_gain")}
                 Z, notes = np.array([one.z for one in new]), [one.note for one in new]
-                sets.append(from_vectors(self.programs(method), Z, about, stats, notes=notes, **columns))
-        points = (sets[0] if len(sets) == 1 else Points.concatenate(sets)).replace(solver=about, stats=stats)
+                sets.append(from_vectors(self.programs(method), Z, solver, stats, notes=notes, **columns))
+        points = (sets[0] if len(sets) == 1 else Points.concatenate(sets)).replace(solver=solver, stats=stats)
         for note in filter(None, (one.note for one in some)):
             log.info("%s: %s", self.problem.name, note)
-        return verified(points, front.stats.get("verify", VERIFY), objective_scales(front))
+        found, verify = points.notes, front.stats.get("verify", VERIFY)
+        points = verified(points, verify, objective_scales(front))
+        if points.verified.all():
+            return points
+        points = resolve_unverified(points, verify)
+        return points.replace(notes=["; ".join(dict.fromkeys(filter(None, both))) for both in zip(found, points.notes, strict=True)])
 
     def _words(self, limits: np.ndarray) -> str:
         """Objectives (m,) in words; those that are no numbers are left out."""

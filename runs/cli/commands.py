@@ -115,14 +115,22 @@ def solve(arguments: Namespace) -> int:
 def show(arguments: Namespace) -> int:
     """A saved front, or one of its points."""
     check_picture(arguments.plot)
-    if arguments.costates and (arguments.point is None or not arguments.plot):
+    if arguments.costates and ((arguments.point is None and not arguments.at) or not arguments.plot):
         raise WrongCall("--costates is for the picture of a trajectory: --point I --plot FILE")
+    if arguments.at and arguments.point is not None:
+        raise WrongCall("give --point or --at, not both")
     if arguments.csv:
         check_target(arguments.csv)
         if same_file(arguments.csv, arguments.front):
             raise WrongCall(f"--csv {arguments.csv} would overwrite the front itself")
     with wrong_call_on_value_error():
-        front = Front.load(arguments.front)
+        front = Front.load(arguments.front, trust=arguments.trust)
+        if arguments.problem and front.source is not None:
+            front = front.replace(problem=front.source.check(problem_of(front.source, arguments.problem), arguments.front))
+        if arguments.at:
+            wanted = decide_command.assignments(",".join(arguments.at), front.goals)
+            found = front.at(wanted) if len(wanted) < len(front.goals) else front.nearest(wanted)
+            front, arguments.point = Front.of(found.alone()), 0
     point = None if arguments.point is None else find_point(front, arguments.point)
     if arguments.plot and point is not None and front.dynamic and point.trajectory is None:
         raise WrongCall(f"point {arguments.point} has no trajectory to draw")

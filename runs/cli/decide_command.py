@@ -133,7 +133,7 @@ def _improvement(arguments: Namespace, goals: Sequence[Objective]) -> tuple[str,
         return None
     name = _name(arguments.improve, goals)
     to = None if arguments.to is None else _value(arguments.to, name, goals)
-    return name, to, _assignments(",".join(arguments.giving or []), goals)
+    return name, to, assignments(",".join(arguments.giving or []), goals)
 
 
 class Commands(cmd.Cmd):
@@ -186,7 +186,7 @@ class Commands(cmd.Cmd):
         if name not in [goal.name for goal in goals] and " to " in words:
             name, _, text = words.rpartition(" to ")
             to = _value(text, _name(name, goals), goals)
-        self.dialogue.improve(_name(name, goals), to, _assignments(given, goals))
+        self.dialogue.improve(_name(name, goals), to, assignments(given, goals))
         print(shown(self.dialogue))
 
     def do_alternatives(self, arg: str) -> None:
@@ -242,7 +242,7 @@ def _value(text: str, name: str, goals: Sequence[Objective]) -> float:
         raise ValueError(f"'{text.strip()}' is no value of '{name}'{f' in {unit}' if unit else ''}") from None
 
 
-def _assignments(text: str, goals: Sequence[Objective]) -> dict[str, float]:
+def assignments(text: str, goals: Sequence[Objective]) -> dict[str, float]:
     """{name: value} of "NAME=VALUE, NAME=VALUE", of which names may have commas."""
     parts: list[str] = []
     for part in text.split(",") if text.strip() else []:
@@ -261,7 +261,7 @@ def _assignments(text: str, goals: Sequence[Objective]) -> dict[str, float]:
 
 
 def _reference(dialogue: Dialogue, text: str) -> None:
-    given = _assignments(text, dialogue.goals)
+    given = assignments(text, dialogue.goals)
     units = {goal.name: goal.unit for goal in dialogue.goals}
     words = ", ".join(f"{name} {value:g} {units[name]}".rstrip() for name, value in given.items())
     dialogue.choose(ReferencePoint(given), f"near {words}")

@@ -42,6 +42,12 @@ def begun(**more: Any) -> Dialogue:
     return Dialogue(front(), cart(), MESH, **more)
 
 
+def test_without_a_transcription_a_reference_point_is_solved_between_its_neighbours() -> None:
+    choice = Dialogue(front(), cart()).choose(HOPED)
+    assert choice.objectives["time"] == pytest.approx(AT_HOPED, rel=3e-6) and choice.point.verified
+    assert choice.point.stats["gradient_solves"] == 1 and choice.point.transcription == front()[0].transcription
+
+
 @pytest.mark.slow
 def test_with_the_problem_choices_are_optima() -> None:
     dialogue = begun()

@@ -5,10 +5,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from carts import MESH, cart
 from synthetic_fronts import flights
 
 import macs
-from macs import Front
+from macs import Front, sweep
 from problems import names
 from runs.batch import file as studyfile
 from runs.cli import main
@@ -359,6 +360,19 @@ def test_show_prints_draws_and_exports(capsys):
         and "values in a.csv" in out
     )
     assert Path("a.pdf").read_bytes().startswith(b"%PDF") and Path("a.csv").read_text().startswith("point,time [s],height [km]")
+
+
+def test_show_any_point(capsys, refused):
+    sweep(cart(), MESH, points=4, starts=1).save("cart.nc")
+    Path("trip.py").write_text("from carts import cart\n\ndef build():\n    return cart()\n")
+    assert main(["show", "cart.nc", "--at", "distance=2 m", "--problem", "trip.py:build", "--csv", "trip.csv", "--plot", "trip.png"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"effort +(2|2\.0000\d+|1\.9999\d+)\n", out) and "verified within" in out, "x' = u for two seconds, of least effort"
+    assert Path("trip.csv").read_text().startswith("phase,time") and Path("trip.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["show", "cart.nc", "--at", "distance=2, effort=1", "--problem", "trip.py:build"]) == 0
+    assert "lies off the front" in capsys.readouterr().out
+    assert "not both" in refused("show", "cart.nc", "--at", "effort=2", "--point", "1")
+    assert "stated in a script" in refused("show", "cart.nc", "--at", "effort=2")
 
 
 @pytest.mark.slow

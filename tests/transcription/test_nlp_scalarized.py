@@ -104,6 +104,26 @@ def test_a_guarded_solve_makes_no_objective_worse(seed: int, orbits: bool) -> No
     assert again.status == "converged" and np.all((again.F - solved.F) / ranges <= 1e-7)
 
 
+@pytest.mark.parametrize(("first", "second"), [(1.0, 1.0), (3.0, 1.0), (1e-6, 3e-6), (0.0, 2.0)])
+def test_the_least_weighted_sum(first: float, second: float) -> None:
+    # first p^2 + second (p - 1)^2 is least at second / (first + second).
+    p = second / (first + second)
+    solved = solve(nlp_of(two_wells()), [0, 0], [first, second], summed=True)
+    assert solved.status == "converged" and close(solved, [p**2, (p - 1) ** 2], 1e-7)
+    found = solved.multipliers.of_objectives
+    assert found / found.sum() == pytest.approx([first / (first + second), p], abs=1e-6)
+
+
+@pytest.mark.parametrize("summed", [False, True])
+def test_a_start_with_multipliers_takes_fewer_iterations_to_the_same(summed: bool) -> None:
+    nlp, reference = goddard(), np.array([150.0, -0.3])
+    known = scalarize(nlp, feasible(nlp, 1), reference=reference, weights=RANGES if not summed else 1 / RANGES, summed=summed)
+    task = {"reference": np.array([155.0, -0.3]), "weights": RANGES if not summed else [1.1, 1.0] / RANGES, "summed": summed}
+    cold, warm = (scalarize(nlp, known.z, near=True, warm=one, **task) for one in (None, known.multipliers))
+    assert warm.status == "converged" and warm.iterations < cold.iterations
+    assert pytest.approx(cold.F, rel=1e-6) == warm.F
+
+
 @pytest.mark.parametrize("course", [2.8, -2.8, 0.3, 3.1415])
 def test_a_periodic_control_passes_the_end_of_its_box(course: float) -> None:
     nlp = nlp_of(compass())

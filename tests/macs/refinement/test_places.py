@@ -207,7 +207,7 @@ def test_the_simplex_around_a_place():
         (lambda f: f.at({"time": 1.0, "effort": 12.0}), "nearest"),
         (lambda f: f.at(weights={"time": -1.0}), "negative"),
         (lambda f: f.nearest({"time": 1.0}), "'effort'"),
-        (lambda f: f[3:4].at({"time": 1.0}), "one feasible point"),
+        (lambda f: f[3:4].at({"time": 1.0}), "1 feasible point"),
         (lambda f: f.dense(1), "at least 2"),
     ],
 )
