@@ -80,9 +80,8 @@ def shares(X: np.ndarray) -> np.ndarray:
 
 def predicted(task: Scalarised, nlp: NLP, around: Sequence[Neighbour], parts: np.ndarray) -> tuple[list[Start], float]:
     """Starts for a task, in turn, and the loss that a good result has at most, from the points around its place and their shares (k,)."""
-    F, found = np.array([one.F for one in around]), list[Start]()
+    Z, F, found = np.array([one.z for one in around]), np.array([one.F for one in around]), list[Start]()
     near = np.argsort(np.linalg.norm(coordinates(task, F), axis=1), kind="stable").tolist()
-    Z = np.array([one.z for one in around])
     if len(around) > 1 and (Z[:, nlp.integers] == Z[0, nlp.integers]).all():
         z = back_in_bounds(nlp, parts @ Z)
         if nlp.evaluate(z[None])[1][0] <= END.close:
@@ -112,10 +111,8 @@ def promised(task: Scalarised, around: Sequence[Neighbour], parts: np.ndarray) -
 def _mixed(around: Sequence[Neighbour], parts: np.ndarray) -> Multipliers | None:
     """The mean of the multipliers that are known, of the objectives' own units each."""
     known = [(part, one.multipliers) for part, one in zip(parts, around, strict=True) if one.multipliers is not None]
-    if not known:
-        return None
     total = sum(part for part, _ in known)
-    return _sum([(part / total, one) for part, one in known])
+    return _sum([(part / total, one) for part, one in known]) if known else None
 
 
 def _sum(parts: Sequence[tuple[float, Multipliers]]) -> Multipliers:

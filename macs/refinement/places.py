@@ -264,8 +264,7 @@ class KnownPoints:
     def found(self, some: Sequence[KnownPoint]) -> Points:
         """Points, certified and simulated; what a simulation does not confirm is solved again."""
         front, about = self.front, {name: self.front.stats[name] for name in ("seed", "tolerance")}
-        elapsed = time.perf_counter() - self._began
-        stats = costs(self.counts, wall_time=elapsed, reproducible=not self.counts.clocked, **about)
+        stats = costs(self.counts, wall_time=time.perf_counter() - self._began, reproducible=not self.counts.clocked, **about)
         solver, sets = {"name": "at", "settings": {}}, list[Points]()
         for method in dict.fromkeys(one.method for one in some):
             mine = [one for one in some if one.method == method]

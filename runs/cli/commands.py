@@ -117,8 +117,6 @@ def show(arguments: Namespace) -> int:
     check_picture(arguments.plot)
     if arguments.costates and ((arguments.point is None and not arguments.at) or not arguments.plot):
         raise WrongCall("--costates is for the picture of a trajectory: --point I --plot FILE")
-    if arguments.at and arguments.point is not None:
-        raise WrongCall("give --point or --at, not both")
     if arguments.csv:
         check_target(arguments.csv)
         if same_file(arguments.csv, arguments.front):
@@ -127,7 +125,7 @@ def show(arguments: Namespace) -> int:
         front = Front.load(arguments.front, trust=arguments.trust)
         if arguments.problem and front.source is not None:
             front = front.replace(problem=front.source.check(problem_of(front.source, arguments.problem), arguments.front))
-        if arguments.at:
+        if arguments.at:  # in place of --point
             wanted = decide_command.assignments(",".join(arguments.at), front.goals)
             found = front.at(wanted) if len(wanted) < len(front.goals) else front.nearest(wanted)
             front, arguments.point = Front.of(found.alone()), 0

@@ -244,9 +244,7 @@ def _add_show(commands: argparse._SubParsersAction[Parser]) -> None:
     show = _add(commands, "show", "a saved front: its table, a picture, an export")
     show.add_argument("front", metavar="FRONT.nc")
     show.add_argument("--point", metavar="I", type=int, help="only this point, in detail; --plot draws its flight")
-    show.add_argument(
-        "--at", metavar="NAME=VALUE", action="append", help="in place of --point: the point with these values, solved (of all: the nearest)"
-    )
+    show.add_argument("--at", metavar="NAME=VALUE", action="append", help="the point with these values, solved (of all: the nearest)")
     show.add_argument("--problem", metavar="PROBLEM", help="with --at: the problem, for a front that does not name one of `macs list`")
     show.add_argument("--trust", action="store_true", help="with --at: run the code that the file names to make its problem")
     show.add_argument("--details", action="store_true", help="with violation, defect, optimality and the like")

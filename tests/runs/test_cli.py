@@ -371,7 +371,6 @@ def test_show_any_point(capsys, refused):
     assert Path("trip.csv").read_text().startswith("phase,time") and Path("trip.png").read_bytes().startswith(b"\x89PNG")
     assert main(["show", "cart.nc", "--at", "distance=2, effort=1", "--problem", "trip.py:build"]) == 0
     assert "lies off the front" in capsys.readouterr().out
-    assert "not both" in refused("show", "cart.nc", "--at", "effort=2", "--point", "1")
     assert "stated in a script" in refused("show", "cart.nc", "--at", "effort=2")
 
 
