@@ -238,7 +238,8 @@ def test_a_hundred_runs_of_a_hundred_points_open_with_the_work_of_the_drawing_pa
     path, work = tmp_path / "page.html", dict.fromkeys(contents, float("inf"))
 
     def is_quick() -> bool:
-        return work["10 000 points"] < 1.25 * work["package alone"] and work["10 points"] < 0.85 * work["package alone"]
+        # 0.95, was 0.85: the trajectory of the knee, four figures more, is drawn at once.
+        return work["10 000 points"] < 1.25 * work["package alone"] and work["10 points"] < 0.95 * work["package alone"]
 
     for _ in range(3):  # side by side: the least of each is what its page costs, whatever else the machine does
         for name, content in contents.items():
