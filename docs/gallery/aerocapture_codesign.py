@@ -18,9 +18,9 @@ front.plot_trajectories(some)
 
 # What was learned
 #
-# The three objectives are in conflict: #0 is the most compact capsule, 0.50 1/m², #4 has the lightest heat shield, 5.2 %, and both
-# leave the air as steeply as the limit of 45 m/s allows; #5 has the smallest burn, 30.2 m/s, of a flight that stays high and long,
-# and a shield of 9.0 %. The points between save on two at a time: #3 has a shield of 6.1 % and a burn of 33.7 m/s, and is less
-# compact. All three flights of the picture lift up at first and, with one fast roll, down for the rest. All points are verified;
-# with 38 gradient solves from one start they are local optima. They are blunt capsules, with lift at negative angles of attack:
-# slender ones are another piece of the front, which a start with `shape=1` finds.
+# The three objectives are in conflict: #0 is the most compact capsule, 0.50 1/m², #4 has the lightest heat shield, 5.2 %, and
+# both leave the air as steeply as the limit of 45 m/s allows; #5 has the smallest burn, 30.2 m/s, of a flight that stays high and
+# long, and a shield of 9.0 %. The points between save on two at a time: #3 has a shield of 6.1 % and a burn of 33.7 m/s, and is
+# less compact. All three flights of the picture lift up at first and, with one fast roll, down for the rest. All points are
+# verified; with 33 gradient solves from one start they are local optima. They are blunt capsules, with lift at negative angles of
+# attack: slender ones are another piece of the front, which a start with `shape=1` finds.

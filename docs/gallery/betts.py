@@ -16,7 +16,7 @@ best.plot(costates=True)
 
 # What was learned
 #
-# The cross-range is 34.1413 deg, with Betts 34.1412, and the final time agrees in all printed digits. The vehicle banks steeply at
-# first and rolls out evenly; its angle of attack hardly changes until the last turn. The oscillations are those of a glide that is
-# too fast for its altitude. No bound acts but that of the bank angle at the very end. It took 15 gradient solves on a mesh that was
-# refined until it and a simulation agreed.
+# The cross-range is 34.1413 deg, with Betts 34.1412, and the final time agrees in all printed digits. The vehicle banks steeply
+# at first and rolls out evenly; its angle of attack hardly changes until the last turn. The oscillations are those of a glide
+# that is too fast for its altitude. No bound acts but that of the bank angle at the very end. It took 17 gradient solves on a
+# mesh that was refined until it and a simulation agreed.

@@ -76,9 +76,9 @@ def _table(front: Points, columns: Mapping[str, Sequence[Any]], details: bool) -
     table: list[tuple[tuple[str, str], Sequence[str], bool]] = [(("#", ""), [str(i) for i in range(len(front))], False)]
     for goal, values, tolerance in zip(front.goals, front.objectives.T, front.resolution, strict=True):
         table.append(((goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]"), numbers(values, tolerance), False))
-    for name, unit, values in parameters_of(front):
+    for name, unit, resolution, values in parameters_of(front):
         words = not all(isinstance(value, float) for value in values)
-        cells = ["-" if value is None else str(value) for value in values] if words else numbers(values)
+        cells = ["-" if value is None else str(value) for value in values] if words else numbers(values, resolution)
         table.append(((name, f"[{unit or '-'}]"), cells, any(isinstance(value, str) for value in values)))
     table += _residuals(front) if details else []
     for header, given in columns.items():
@@ -109,14 +109,14 @@ def _residuals(front: Points) -> Sequence[tuple[tuple[str, str], Sequence[str], 
     return table
 
 
-def parameters_of(front: Points, few: int = 6) -> list[tuple[str, str, list[Any]]]:
-    """Name, unit and the values at all points of static parameters, without trajectories of all variables, if they are `few`."""
+def parameters_of(front: Points, few: int = 6) -> list[tuple[str, str, float, list[Any]]]:
+    """Name, unit, a ten-thousandth of the bounds and the values of each static parameter, or variable without trajectories, if `few`."""
     each = [point.parameters for point in front]
     most = max(range(len(each)), key=lambda i: len(each[i]), default=0)
     if not each or len(each[most]) > few:
         return []
-    units = {variable.name: variable.unit for variable in front[most].variables}
-    return [(name, units.get(name, ""), [one.get(name) for one in each]) for name in each[most]]
+    known = {variable.name: (variable.unit, 1e-4 * (variable.upper - variable.lower)) for variable in front[most].variables}
+    return [(name, *known.get(name, ("", np.nan)), [one.get(name) for one in each]) for name in each[most]]
 
 
 def _is_vector(front: Points) -> bool:

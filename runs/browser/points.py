@@ -65,7 +65,10 @@ def columns(front: Front) -> dict[str, Any]:
     return {
         "count": len(front),
         "tolerances": finite(front.resolution),
-        "parameters": [{"name": name, "unit": unit, "values": values} for name, unit, values in parameters_of(front)],
+        "parameters": [
+            {"name": name, "unit": unit, "resolution": resolution if resolution > 0 else None, "values": values}
+            for name, unit, resolution, values in parameters_of(front)
+        ],
         "objectives": [finite(column) for column in front.objectives.T],
         "simulated": [finite(column * sign) for column, sign in zip(front.simulated_F.T, front.signs, strict=True)],
         "verified": [bool(mark) if known else None for mark, known in zip(front.verified, was, strict=True)],

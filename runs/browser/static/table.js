@@ -15,10 +15,10 @@ function tableColumns() {
   const all = [
     ...(several ? [{ title: "solver", words: true, value: (p) => p.solver, text: texts }, { title: "run", value: (p) => p.run.number, text: texts }] : []),
     { title: several ? "point" : "#", value: (p) => p.index, text: texts },
-    ...goals.map((goal, i) => ({ title: goal.name, unit: `${goal.sense.slice(0, 3)} [${goal.unit || "-"}]`, value: (p) => p.values[i], text: (values) => (state.decimals[i] === null ? column(values) : values.map((value) => fixed(value, state.decimals[i]))) })),
+    ...goals.map((goal, i) => ({ title: goal.name, unit: `${goal.sense.slice(0, 3)} [${goal.unit || "-"}]`, value: (p) => p.values[i], text: columnWithin(state.decimals[i]) })),
     ...(state.comparison.runs.find((run) => run.points.parameters.length)?.points.parameters ?? []).map((one, k) => {
       const words = one.values.some((value) => typeof value === "string");
-      return { title: one.name, unit: `[${one.unit || "-"}]`, words, value: (p) => p.run.points.parameters[k]?.values[p.index] ?? null, text: words || one.values.every(Number.isInteger) ? texts : column };
+      return { title: one.name, unit: `[${one.unit || "-"}]`, words, value: (p) => p.run.points.parameters[k]?.values[p.index] ?? null, text: words || one.values.every(Number.isInteger) ? texts : columnWithin(decimalsWithin(one.values, one.resolution)) };
     }),
     { title: "violation", value: (p) => p.violation, text: smalls, hidden: !detailed() },
     { title: "defect", unit: how, value: (p) => p.defect, text: smalls, optional: true, hidden: !dynamic || !detailed() },
@@ -28,6 +28,8 @@ function tableColumns() {
   ];
   return all.filter((one) => !one.hidden && (!one.optional || state.points.some((point) => one.value(point) !== null)));
 }
+
+const columnWithin = (decimals) => (values) => (decimals === null ? column(values) : values.map((value) => fixed(value, decimals)));
 
 /** Whether violation, defect, optimality and the like are shown, of the table and of the selected point. */
 function buildDetails() {
