@@ -21,6 +21,6 @@ best.plot(costates=True)
 
 # What was learned
 #
-# All happens in the first and the last few units of time; between, state and control are zero. The mesh is refined where the layers
-# are, so that a long rest costs nothing. The cost is 3e-6 above the closed form: the refinement ends once a simulation and a finer
-# mesh agree, not at the last digit. The Hamiltonian is zero but for round-off.
+# All happens in the first and the last few units of time; between, state and control are zero. The mesh is refined where the
+# layers are, so that a long rest costs nothing. The cost is 1e-6 above the closed form: the refinement ends once a simulation and
+# a finer mesh agree, not at the last digit. The Hamiltonian is zero but for round-off.

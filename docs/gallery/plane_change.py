@@ -19,6 +19,6 @@ best.plot(costates=True)
 
 # What was learned
 #
-# Nearly all of the turn is made in one dip of some hundred seconds, at the lowest altitude; before and after the vehicle glides. The
-# peak of the heating rate is 772: the limit of 800 does not act. The speed agrees with the published one to 0.001 ft/s. It took 68
-# gradient solves, most of them from other starts, which led to nothing better.
+# Nearly all of the turn is made in one dip of some hundred seconds, at the lowest altitude; before and after the vehicle glides.
+# The peak of the heating rate is 772: the limit of 800 does not act. The speed agrees with the published one to 0.001 ft/s. It
+# took 75 gradient solves, most of them from other starts, which led to nothing better.

@@ -22,7 +22,7 @@ best.plot(costates=True)
 
 # What was learned
 #
-# Full thrust, then a thrust that holds the speed nearly constant while the mass falls, then a coast. Since each arc is a phase of its
-# own, the thrust is smooth within it, and the height agrees with YAPSS in all printed digits, 18550.8719 ft; on [another
-# rocket](rocket.md), in one phase, the mesh has to find the arcs, and does so less exactly. The Hamiltonian is 0 in all phases, as
-# the times are free. The limits of the thrust do not act in the singular phase.
+# Full thrust, then a thrust that holds the speed nearly constant while the mass falls, then a coast. Since each arc is a phase of
+# its own, the thrust is smooth within it, and the height agrees with YAPSS in all printed digits, 18550.8719 ft; on [another
+# rocket](rocket.md), in one phase, the mesh has to find the arcs. The Hamiltonian is 0 in all phases, as the times are free. The
+# limits of the thrust do not act in the singular phase.

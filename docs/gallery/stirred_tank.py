@@ -24,6 +24,6 @@ best.plot(costates=True)
 
 # What was learned
 #
-# Cooling is strongest at the start and fades; no bound acts. Of 50 starts 43 led to this optimum, the others to worse ones, among
-# which one of nearly twice the cost is known from the literature. A single start may end there: that is why `optimize` begins anew
-# until other starts stop paying.
+# Cooling is strongest at the start and fades; no bound acts. Of 36 starts 31 led to this optimum, the others to worse ones, among
+# which one of nearly twice the cost is known from the literature. A single start may end there: that is why `optimize` begins
+# anew until other starts stop paying.
