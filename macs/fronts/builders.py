@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from transcription.trajectories.simulate import limits_by_label
 from ..evaluation.evaluator import CONVERGED, FAILED, INFEASIBLE
 from ..io.interrupts import spending
 from ..io.text import counted
+from ..io.workers import each
 from ..pareto.archive import Archive
 from ..pareto.dominance import nondominated
 from .point import Point
@@ -80,24 +80,31 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
     Only what is `CERTIFIED` has the last two: those of the objectives of a mask `sole` (m,) where it is so for these alone, since other
     weights may do as well at an end of a front.
     """
-    optimality: list[float | None] = [None] * len(Z)
-    found: list[Costates | None] = [None] * len(Z)
-    gained: list[float | None] = [None] * len(Z)
-    with suppress(Stopped):
-        for k, z in enumerate(Z):
-            check_stopping()
-            conditions = Conditions.of(nlp, z, ranges)
-            some = None if sole is None else _alone(nlp, z, ranges, sole, conditions)
-            known = [one for one in (some, conditions) if one is not None]
-            # With so small a residual of the objectives asked for that of all is not sought: it is hardly less, and takes as long.
-            small = next((one.residual for one in known if one.residual <= 1e-6), None)
-            optimality[k] = min((one.residual for one in known), default=np.inf) if small is None else small
-            feasible = nlp.evaluate(z[None])[1][0] <= CERTIFIED
-            best = next((one for one in known if feasible and one.residual <= CERTIFIED), None)
-            multipliers = None if best is None else best.multipliers()
-            if multipliers is not None:
-                found[k], gained[k] = costates(nlp, z, multipliers), _weighted_gain(nlp, z, multipliers)
-    return {"optimality": optimality, "costates": found, "weighted_gain": gained}
+    names, rows = ("optimality", "costates", "weighted_gain"), each(_certificate, nlp, [(z, ranges, sole) for z in Z])
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+
+
+Certificate = tuple[float | None, Costates | None, float | None]
+
+
+def _certificate(nlp: NLP, z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray | None) -> Certificate:
+    """The columns of `certified` of one vector (n,)."""
+    try:
+        check_stopping()
+        conditions = Conditions.of(nlp, z, ranges)
+        some = None if sole is None else _alone(nlp, z, ranges, sole, conditions)
+        known = [one for one in (some, conditions) if one is not None]
+        # With so small a residual of the objectives asked for that of all is not sought: it is hardly less, and takes as long.
+        small = next((one.residual for one in known if one.residual <= 1e-6), None)
+        optimality = min((one.residual for one in known), default=np.inf) if small is None else small
+        feasible = nlp.evaluate(z[None])[1][0] <= CERTIFIED
+        best = next((one for one in known if feasible and one.residual <= CERTIFIED), None)
+        multipliers = None if best is None else best.multipliers()
+        if multipliers is None:
+            return optimality, None, None
+        return optimality, costates(nlp, z, multipliers), _weighted_gain(nlp, z, multipliers)
+    except Stopped:
+        return None, None, None
 
 
 def _weighted_gain(nlp: NLP, z: np.ndarray, found: Multipliers) -> float | None:

@@ -309,12 +309,16 @@ class Surface:
         start = good[np.linalg.norm(self.plane(self.pool.F[good]) - place, axis=1).argmin()]
         return int(start), place
 
-    def solve(self, solves: BudgetedSolves, start: int, place: np.ndarray) -> None:
-        """Add the result of a solve to a place."""
-        found = solves(self.pool.Z[[start]], (self.ideal + self.between * place)[None], self.between[None])
+    def solve(self, solves: BudgetedSolves, count: int, guide: Guide | None) -> None:
+        """Add the results of solves to so many next places, side by side."""
+        starts, places = list[int](), list[np.ndarray]()
+        for _ in range(count):
+            start, place = self.even() if guide is None else self.guided(guide)
+            starts, places, self.known = [*starts, start], [*places, place], np.vstack([self.known, place])
+        found = solves(self.pool.Z[starts], self.ideal + self.between * np.array(places), np.tile(self.between, (count, 1)))
         feasible = solves.feasible(found)
         solves.results.keep(feasible)
-        self.known = np.vstack([self.known, place, self.plane(found.F[feasible])])
+        self.known = np.vstack([self.known, self.plane(found.F[feasible])])
         self.pool = Archive.of(found, feasible).joined(self.pool)
         # What ran out of iterations is to go on.
         self.solved = np.vstack([self.solved, found.F[found.status == CONVERGED]])
@@ -339,12 +343,16 @@ def cover(archive: Archive, ends: Archive, solves: BudgetedSolves, limit: int, g
     between = np.where(between > 0.0, between, span)
     known = across((ends.F - ideal) / between)
     surface = Surface(pool.take(distinct(pool.F, span)), ideal, between, known, ends.F)
-    for k in range(max(limit, solves.left)):
+    made, most = 0, max(limit, solves.left)
+    while made < most and solves.left > 0:
         # As long as it says nothing, the search is even.
         guided = guide is not None and np.ptp(guide.factors(surface.pool.F, surface.pool.F)) > 0.0
-        if solves.left <= 0 or (k >= limit and not guided):
+        # Of four at a time, 0.1 % of the hypervolume of two fronts was lost: the next place depends on what the last one led to.
+        count = min(TOGETHER // 4, solves.left, (most if guided else limit) - made)
+        if count <= 0:
             break
-        surface.solve(solves, *(surface.guided(guide) if guide is not None and guided else surface.even()))
+        surface.solve(solves, count, guide if guided else None)
+        made += count
     return surface
 
 

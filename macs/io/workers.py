@@ -102,7 +102,7 @@ class Helpers:
         """See `each` beside this class."""
         self.batches.append(len(pieces))
         found, left, begun = dict[int, Future[Any]](), deque(range(len(pieces))), dict[Future[Any], int]()
-        data = self._packed(do, shared) if self._worth else b""
+        data, work = self._packed(shared, do) if self._worth else (b"", b"")
         digest, stop = hashlib.sha256(data).hexdigest(), Path(tempfile.gettempdir()) / f"macs-{uuid.uuid4().hex}"
         lock, ready = threading.RLock(), 0
 
@@ -115,7 +115,7 @@ class Helpers:
                     if sum(not one.done() for one in begun) >= ready * (2 if len(left) > 2 * self._count else 1):
                         break
                     k = left.popleft()
-                    future = self._submit(_perform, digest, data, pieces[k], str(stop))
+                    future = self._submit(_perform, digest, data, work, pieces[k], str(stop))
                     begun[future] = k
                     future.add_done_callback(feed)
 
@@ -159,15 +159,16 @@ class Helpers:
         """Whether there was enough work for other processes to pay: a second is what it takes to begin them. Killed twice, they do not."""
         return self._given or (self._seconds >= 1.0 and self._killed < 2)
 
-    def _packed(self, do: Callable[..., Any], shared: Any) -> bytes:
-        """What others need for pieces; none where it cannot be sent, such as a model that is called back."""
+    def _packed(self, *parts: Any) -> tuple[bytes, ...]:
+        """What others need for pieces, what these share apart: it is learned once for whatever is done with it. None where it cannot be
+        sent, such as a model that is called back."""
         try:
-            return cloudpickle.dumps((do, shared))
+            return tuple(map(cloudpickle.dumps, parts))
         except Exception as error:
             if self._given:
                 raise
             _alone(str(error).rsplit("\n", 1)[-1])
-            return b""
+            return (b"",) * len(parts)
 
     def _ready(self, left: int, digest: str, data: bytes) -> int:
         """How many processes may have pieces. They learn what a piece needs while this process works."""
@@ -249,9 +250,8 @@ def _learn(digest: str, data: bytes) -> None:
     _KEPT.move_to_end(digest)
 
 
-def _perform(digest: str, data: bytes, piece: tuple[Any, ...], stop: str) -> Any:
+def _perform(digest: str, data: bytes, work: bytes, piece: tuple[Any, ...], stop: str) -> Any:
     """One piece of work in a process."""
     with processes(1), stopped_by(lambda: "asked to end" if Path(stop).exists() else ""), work_on_trajectories():
         _learn(digest, data)
-        do, shared = _KEPT[digest]
-        return do(shared, *piece)
+        return cloudpickle.loads(work)(_KEPT[digest], *piece)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial, wraps
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from transcription import from_dict
+from transcription.base import Transcription
 from transcription.inner import Propagate
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
@@ -20,19 +21,20 @@ from transcription.nlp.scalarized import Solved
 from transcription.stopping import Stopped, stopping
 
 from ..evaluation.bilevel import Bilevel
-from ..evaluation.evaluator import CONVERGED
+from ..evaluation.evaluator import CONVERGED, Counts
 from ..fronts.builders import best_rows, certified, from_vectors
 from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import Simulations, feasible_as_simulated, largest_miss, missed, objective_scales, untrusted, verified
 from ..gradients.front_polish import KEPT_INSIDE, back_off
-from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal
+from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal, weightless
 from ..io.console import working
 from ..io.interrupts import spending
+from ..io.workers import TOGETHER
 from ..pareto.dominance import extremes, separate
 from ..pareto.spread import Guide, spread
 from .front_refinement import FrontRefinement
-from .mesh_loop import LOOP, OnMesh, Programs, differentiable
+from .mesh_loop import LOOP, MeshLoop, OnMesh, Programs, differentiable
 from .mesh_search import SEARCH
 
 
@@ -77,7 +79,7 @@ def mended(
         again = job.resolve_unverified(fine)
         joined = job.strong(again)
         if joined is job.points and joined.verified.all() and len(joined) >= size:
-            return _separate(joined[best_rows(joined)]).sorted()
+            return job.with_costs(_separate(joined[best_rows(joined)]).sorted(), interrupts.elapsed, interrupts.reason)
         kept = _separate(joined[best_rows(joined, verify * objective_scales(joined))])
         if joined is not job.points or len(kept) < size:
             kept = job.marked(job.fill_gaps(kept, max(size, len(points)), guide))
@@ -116,6 +118,9 @@ class _Mending:
         there = {from_dict(one) for one in points.transcriptions if one}
         self.programs, self.simulations = Programs(problem, MENDING.meshes, there), Simulations(problem, verify)
         self._solves = GradientSolves(float(points.stats["tolerance"]))
+        limits = MENDING.part * verify
+        self._wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False)
+        self._loop = MeshLoop(self.programs, self._solves, self._wanted, MENDING.meshes)
         self._work, self._scales, self.missing = points.stats.get("work", 0), None, ""
         self.ends = None if ends is None else self.marked(ends)
         # With ends that are known to simulate, tolerances are fixed by these; else by what the points are in the end.
@@ -176,7 +181,9 @@ class _Mending:
         if not rows:
             return points
         self.show("points that are infeasible when simulated are solved again")
-        return self.marked(_inside_limits(points, rows, self.verify, loss))
+        moved, counts = _inside_limits(self.programs, points, rows, self.verify, loss)
+        self._solves.counts = self._solves.counts.joined(counts)
+        return self.marked(moved)
 
     def with_ends(self, points: Points) -> Points:
         """The points with those verified ends that are better in an objective than all of them, by more than optima may miss."""
@@ -198,46 +205,67 @@ class _Mending:
         fruitless, without, ended = 0, Counter[str](), ""
         while 0 < points.verified.sum() < size and fruitless < LOOP.patience:
             scales = objective_scales(points)
-            target = _target(points, tried, scales, guide)
-            used_up = self._solves.counts.work >= most
-            if target is None or used_up or stopping():
-                ended = "all gaps were tried" if target is None else "the work for more was used up" if used_up else "the time was over"
+            left, targets = most - self._solves.counts.work, list[np.ndarray]()
+            each = MENDING.each * float(np.mean([len(variables) for variables in points.places]))
+            room = min(TOGETHER // 2, size - int(points.verified.sum()), LOOP.patience - fruitless, max(left / each, 1.0))
+            while len(targets) < room and (target := _target(points, tried, scales, guide)) is not None:
+                targets, tried = [*targets, target], np.vstack([tried, target])
+            if not targets or left <= 0 or stopping():
+                ended = "all gaps were tried" if not targets else "the work for more was used up" if left <= 0 else "the time was over"
                 break
-            tried = np.vstack([tried, target])
-            rows = np.flatnonzero(points.verified)
-            near = np.argsort(np.linalg.norm((points.simulated_F[rows] - target) / scales, axis=1), kind="stable")[: MENDING.starts]
-            new: Points | str = "ended with the time"
+            found: list[Points | str] = ["ended with the time"] * len(targets)
             with suppress(Stopped):  # which ends the loop
-                for row in rows[near]:
-                    new = self._solved(points, int(row), Scalarised(target, scales, units=scales))
-                    if isinstance(new, Points):
-                        break
-            fruitless, before = fruitless + 1, int(points.verified.sum())
-            if isinstance(new, Points):
-                joined = Points.concatenate([points, new]).replace(stats=points.stats, solver=points.solver)
-                joined = joined[np.flatnonzero(_needed(joined) | (target != joined.F).any(axis=1))]  # not what it takes the place of
-                points = _separate(joined[best_rows(joined)])
-                new = "no better than another point" if points.verified.sum() <= before else ""
-                fruitless = fruitless if new else 0
-                self._solves.counts.keep(not new)
-            without[new] += 1
+                found = self._between(points, targets, scales)
+            for target, new in zip(targets, found, strict=True):
+                fruitless, before = fruitless + 1, int(points.verified.sum())
+                if isinstance(new, Points):
+                    joined = Points.concatenate([points, new]).replace(stats=points.stats, solver=points.solver)
+                    joined = joined[np.flatnonzero(_needed(joined) | (target != joined.F).any(axis=1))]  # not what it takes the place of
+                    points = _separate(joined[best_rows(joined)])
+                    new = "no better than another point" if points.verified.sum() <= before else ""
+                    fruitless = fruitless if new else 0
+                    self._solves.counts.keep(not new)
+                without[new] += 1
         points, why = points[_within(points, size, guide)], ", ".join(f"{count} {why}" for why, count in without.items() if why)
         if len(points) < size and (why or ended):
             said = "; ".join(filter(None, [why and f"solves for more: {why}", ended]))
             self.missing = f"{len(points)} of {size} points were found; {said}."
         return points
 
-    def _solved(self, points: Points, row: int, task: Scalarised) -> Points | str:
-        """A verified point of the task from a point, on its mesh, or why there is none."""
-        if not self._meshed(points, np.arange(len(points)) == row):
-            return "had no mesh to be solved on"
-        nlp = self.programs(from_dict(points[row].transcription or {}))
-        solved = task.solve(self._solves, nlp, points[row].decision)
-        if solved.status != CONVERGED:
-            return "did not converge"
-        found = self.marked(from_vectors(nlp, solved.z[None], points.solver, points.stats, **_judged(points[[row]])))
-        found = self._as_simulated(self._inside(found, _slightly_outside(found, self.verify)), SEARCH.passable)
-        return found if found.verified[0] else "not confirmed by simulation"
+    def _between(self, points: Points, targets: Sequence[np.ndarray], scales: np.ndarray) -> list[Points | str]:
+        """For each of some targets (m,) a verified point, from the verified ones nearest to it in turn, or why there is none."""
+        rows, found = np.flatnonzero(points.verified), list[Points | str]([""] * len(targets))
+        apart = np.linalg.norm((points.simulated_F[rows] - np.array(targets)[:, None]) / scales, axis=2)
+        near = rows[np.argsort(apart, axis=1, kind="stable")]
+        for k in range(min(MENDING.starts, len(rows))):
+            left = [i for i, one in enumerate(found) if not isinstance(one, Points)]
+            tasks = [(int(near[i, k]), Scalarised(targets[i], scales, units=scales)) for i in left]
+            for i, one in zip(left, self._solved(points, tasks), strict=True):
+                found[i] = one
+        return found
+
+    def _solved(self, points: Points, tasks: Sequence[tuple[int, Scalarised]]) -> list[Points | str]:
+        """Verified points of tasks side by side, each from the point of a row, on its mesh, or why there is none."""
+        meshed = self._meshed(points, np.isin(np.arange(len(points)), [row for row, _ in tasks]))
+        found: list[Points | str] = ["did not converge" if row in meshed else "had no mesh to be solved on" for row, _ in tasks]
+        pieces = {
+            k: (from_dict(points[row].transcription or {}), points[row].decision, task)
+            for k, (row, task) in enumerate(tasks)
+            if row in meshed
+        }
+        solved = dict(zip(pieces, self._loop.each(_solved_on, [*pieces.values()]), strict=True))
+        good = {k: one.z for k, one in solved.items() if one is not None and one.status == CONVERGED}
+        new = {k: self._made(points, tasks[k][0], pieces[k][0], z) for k, z in good.items()}
+        if new:
+            judged = self.marked(Points.concatenate([*new.values()]))
+            judged = self._as_simulated(self._inside(judged, _slightly_outside(judged, self.verify)), SEARCH.passable)
+            for i, k in enumerate(new):
+                found[k] = judged[[i]] if judged.verified[i] else "not confirmed by simulation"
+        return found
+
+    def _made(self, points: Points, row: int, method: Transcription, z: np.ndarray, **more: Any) -> Points:
+        """A vector (n,) on a mesh as a point that is judged as that of a row."""
+        return from_vectors(self.programs(method), z[None], points.solver, points.stats, **_judged(points[[row]]), **more)
 
     @_unless_stopped
     def strong(self, points: Points) -> Points:
@@ -245,20 +273,22 @@ class _Mending:
         weight on every objective, the objectives without are minimised once. `points` itself if none is better."""
         m, scales, better = points.F.shape[1], objective_scales(points), dict[int, Points]()
         best = extremes(points.F) if len(points) else np.zeros(0)
-        most = self._solves.counts.work + min(self._most_work(points, 0), WORK.most)
+        most, pieces = self._solves.counts.work + min(self._most_work(points, 0), WORK.most), list[tuple[int, Any]]()
         for i in self._meshed(points, points.verified) if m > 1 and differentiable(self.programs.problem) else ():
             own = points[i].weights
             weights = (best == i).astype(float) if own is None else np.array(list(own.values()))
-            if not (weights > 0).any() or self._solves.counts.work >= most or stopping():
-                continue
-            nlp = self.programs(from_dict(points[i].transcription or {}))
-            point = Solved(points[i].decision, points[i].F, points[i].violation, CONVERGED, 0)
-            with self._solves.at_most(MENDING.patience):
-                found = strongly_optimal(partial(self._solves, nlp), self._solves.tolerance, point, weights, scales)
-            if found is not point:
-                certificate = certified(nlp, found.z[None], scales)
-                new = self.marked(from_vectors(nlp, found.z[None], points.solver, points.stats, **certificate, **_judged(points[[i]])))
-                better |= {i: new} if new.verified[0] else {}
+            if (weights > 0).any() and weightless(weights, scales).any():
+                point = Solved(points[i].decision, points[i].F, points[i].violation, CONVERGED, 0)
+                pieces.append((i, (from_dict(points[i].transcription or {}), point, weights, scales)))
+        for k in range(0, len(pieces), TOGETHER // 2):
+            some = pieces[k : k + TOGETHER // 2]
+            if self._solves.counts.work >= most or stopping():
+                break
+            for (i, (method, *_)), found in zip(some, self._loop.each(_strong, [piece for _, piece in some]), strict=True):
+                if found is not None:
+                    certificate = certified(self.programs(method), found.z[None], scales)
+                    new = self.marked(self._made(points, i, method, found.z, **certificate))
+                    better |= {i: new} if new.verified[0] else {}
         self._solves.counts.keep(len(better))
         if not better:
             return points
@@ -294,15 +324,15 @@ class _Mending:
         front's; simulated."""
         if not rows:
             return points
-        limits, gaining = MENDING.part * self.verify, fine is None and bool(points.verified[rows].all())
-        wanted = Wanted(limits, feasible=limits, leaving=limits, objectives=limits, confirmed=False, gain=self._gain if gaining else np.inf)
+        gaining = fine is None and bool(points.verified[rows].all())
+        wanted = replace(self._wanted, gain=self._gain if gaining else np.inf)
         scales = objective_scales(points)
 
         # Where only objectives are off, those of the simulation are known, too.
         blurred = fine is None and bool(feasible_as_simulated(points, self.verify)[rows].all())
         most = self._most_work(points, 0 if gaining else len(rows), fine, 0.0 if blurred or gaining else MENDING.share)
         most += more * self._work
-        enough = partial(_enough, scales, limits)
+        enough = partial(_enough, scales, wanted.tolerance)
         job = FrontRefinement(points, wanted, MENDING.meshes, rows, most, self.programs, enough, MENDING.patience, first=fine)
         job.go(self.show)
         again = self.marked(job.points(0.0, ""))
@@ -314,7 +344,7 @@ class _Mending:
         search, so that the mesh is the only task."""
         if not points.stats["evaluations"]:
             return np.inf
-        spent = points.stats.get("work", 0) - self._work + WORK.building * self.programs.built
+        spent = points.stats.get("work", 0) + self._solves.counts.work - self._work + WORK.building * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places])) if fine is None else len(self.programs(fine).variables)
         return max(share * self._work - spent, MENDING.each * count * size, MENDING.least)
 
@@ -331,13 +361,25 @@ def _slightly_outside(points: Points, verify: float) -> list[int]:
     return np.flatnonzero(beyond & (points.defect <= verify) & (missed(points) <= SEARCH.passable).all(axis=1)).tolist()
 
 
-def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: float = np.inf) -> Points:
+def _solved_on(loop: MeshLoop, method: Meshed, z: np.ndarray, task: Scalarised) -> Solved:
+    """The result of a task from a vector (n,) on a mesh."""
+    return task.solve(loop.solves, loop.programs(method), z)
+
+
+def _strong(loop: MeshLoop, method: Meshed, point: Solved, weights: np.ndarray, scales: np.ndarray) -> Solved | None:
+    """What is better than a point on a mesh by `strongly_optimal`, if anything is."""
+    with loop.solves.at_most(MENDING.patience):
+        found = strongly_optimal(partial(loop.solves, loop.programs(method)), loop.solves.tolerance, point, weights, scales)
+    return None if found is point else found
+
+
+def _inside_limits(programs: Programs, points: Points, rows: Sequence[int], verify: float, loss: float) -> tuple[Points, Counts]:
     """The points, with those of `rows` moved inside the limits that they exceed when simulated, where no objective gets worse by more than
-    the loss, in ranges of the front."""
-    moved: dict[int, Points] = {}
+    the loss, in ranges of the front; and what that cost."""
+    moved, counts = dict[int, Points](), Counts()
     for transcription in {id(points.transcriptions[i]): points.transcriptions[i] for i in rows}.values():
         own = [i for i in rows if points.transcriptions[i] is transcription]
-        nlp = from_dict(transcription or {}).nlp(points.compiled())
+        nlp = programs(from_dict(transcription or {}))
         evaluator = Bilevel(nlp, Propagate(), float(points.stats["tolerance"]))
         if not evaluator.has_gradients:
             continue
@@ -346,12 +388,11 @@ def _inside_limits(points: Points, rows: Sequence[int], verify: float, loss: flo
         worse = ((nlp.evaluate(Z)[0] - points.F[own]) / scales).max(axis=1)
         good = np.flatnonzero(feasible & changed & (worse <= loss)).tolist()
         evaluator.counts.keep(len(good))
-        points = points.replace(stats=more_costs(points.stats, evaluator.counts, 0.0, ""))
+        counts = counts.joined(evaluator.counts)
         for k in good:
             moved[own[k]] = from_vectors(nlp, Z[k : k + 1], points.solver, points.stats, notes=[KEPT_INSIDE], **_judged(points[[own[k]]]))
-    if not moved:
-        return points
-    return Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]).replace(stats=points.stats, solver=points.solver)
+    joined = Points.concatenate([moved.get(i, points[[i]]) for i in range(len(points))]) if moved else points
+    return joined.replace(stats=points.stats, solver=points.solver), counts
 
 
 def _separate(points: Points) -> Points:

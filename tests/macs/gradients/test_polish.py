@@ -1,6 +1,7 @@
 """Refinement by gradients: guarded, counted, certified; on an evaluator with a known front, and on trajectories."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -351,15 +352,16 @@ class Spheres:
     results: Counts = field(default_factory=Counts)
 
     def __call__(self, starts: np.ndarray, references: np.ndarray, weights: np.ndarray) -> Evaluation:
-        (radius,), reference, weight = starts[0], references[0], weights[0]
-        self.left -= 1
-        self.begun.append(float(radius))
-        step = brentq(lambda t: float(np.linalg.norm(np.maximum(reference + t * weight, 0.0))) - radius, -3.0, 3.0)
-        F = np.maximum(reference + step * weight, 0.0)
-        return Evaluation(starts.copy(), F[None], np.zeros(1), np.array([CONVERGED]))
+        F = np.empty(references.shape)
+        for k, ((radius,), reference, weight) in enumerate(zip(starts.tolist(), references, weights, strict=True)):
+            outside = partial(lambda r, w, size, t: float(np.linalg.norm(np.maximum(r + t * w, 0.0))) - size, reference, weight, radius)
+            F[k] = np.maximum(reference + brentq(outside, -3.0, 3.0) * weight, 0.0)
+        self.left -= len(F)
+        self.begun += starts[:, 0].tolist()
+        return Evaluation(starts.copy(), F, np.zeros(len(F)), np.array([CONVERGED] * len(F)))
 
     def feasible(self, found: Evaluation) -> np.ndarray:
-        return np.array([True])
+        return found.status == CONVERGED
 
 
 def on_sphere(directions: np.ndarray, radius: float) -> Archive:

@@ -66,7 +66,7 @@ def test_a_search_with_few_points_gets_more_in_their_gaps(unverified) -> None:
 def test_a_front_says_why_points_are_missing(unverified, monkeypatch, step, result, why) -> None:
     few = unverified.verify(1e-3)
     few = few[np.flatnonzero(few.verified)[[0, -1]]]
-    monkeypatch.setattr(mending._Mending, step, lambda *_: result)
+    monkeypatch.setattr(mending._Mending, step, lambda job, points, tasks, *_: [result] * len(tasks) if step == "_solved" else result)
     assert mending.mended(few, 1e-3, size=5).message.endswith(f"2 of 5 points were found; {why}")
 
 
@@ -98,7 +98,8 @@ def test_verified_points_stay_as_they_are_without_time_all_and_the_work_is_count
         assert before.transcription == after.transcription
     again = mended.mended()
     np.testing.assert_array_equal(again.decision, mended.decision)
-    assert again.stats["gradient_solves"] == mended.stats["gradient_solves"]
+    tried = 1  # solve by which an end is to get better in the other objective: it does not
+    assert again.stats["gradient_solves"] == mended.stats["gradient_solves"] + tried
     assert mended.stats["gradient_solves"] > marked.stats["gradient_solves"] and mended.stats["work"] > marked.stats["work"] > 0
     assert mended.stats["wall_time"] > marked.stats["wall_time"] and mended.stats["verify"] == marked.stats["verify"]
     assert mended.solver == marked.solver and mended.message == marked.message
