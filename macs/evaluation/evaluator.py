@@ -19,7 +19,7 @@ from problems.checks import short_repr
 from problems.compiled import Objective, Variable
 from transcription.base import CONVERGED, FAILED, INFEASIBLE, TIMEOUT
 
-from ..io.interrupts import purpose
+from ..io.interrupts import PURPOSE
 from ..io.text import counted
 
 __all__ = ["CONVERGED", "FAILED", "INFEASIBLE", "TIMEOUT", "Counts", "Evaluation", "Evaluator"]
@@ -239,8 +239,8 @@ class Counts:
         """Count gradient solves with their statuses and iterations, of programs with so many variables; `clocked` of them were ended early
         by a time limit."""
         self.gradient_solves += count
-        self.solves_for += Counter({purpose(): count})
-        self.iterations_for += Counter({purpose(): iterations})
+        self.solves_for += Counter({PURPOSE.get(): count})
+        self.iterations_for += Counter({PURPOSE.get(): iterations})
         self.failures.update(one for one in status if one != CONVERGED)
         self.inner_iterations += iterations
         self.clocked += clocked
@@ -252,7 +252,7 @@ class Counts:
 
     def keep(self, results: Any) -> None:
         """Count gradient solves that gave a new point or a better one: a number or a mask."""
-        self.kept_for += Counter({purpose(): int(np.sum(results))})
+        self.kept_for += Counter({PURPOSE.get(): int(np.sum(results))})
 
     def joined(self, other: Counts) -> Counts:
         """The sums of these and other costs."""

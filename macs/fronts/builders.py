@@ -15,7 +15,6 @@ from transcription.nlp.elastic import opposing
 from transcription.nlp.optimality import Conditions, Multipliers, costates
 from transcription.nlp.program import nlp_scales
 from transcription.stopping import Stopped, check_stopping
-from transcription.trajectories.costates import Costates
 from transcription.trajectories.limits import excursions
 from transcription.trajectories.simulate import limits_by_label
 
@@ -84,10 +83,7 @@ def certified(nlp: NLP, Z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarr
     return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
-Certificate = tuple[float | None, Costates | None, float | None]
-
-
-def _certificate(nlp: NLP, z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray | None) -> Certificate:
+def _certificate(nlp: NLP, z: np.ndarray, ranges: np.ndarray | None, sole: np.ndarray | None) -> tuple[Any, ...]:
     """The columns of `certified` of one vector (n,)."""
     try:
         check_stopping()
@@ -100,9 +96,8 @@ def _certificate(nlp: NLP, z: np.ndarray, ranges: np.ndarray | None, sole: np.nd
         feasible = nlp.evaluate(z[None])[1][0] <= CERTIFIED
         best = next((one for one in known if feasible and one.residual <= CERTIFIED), None)
         multipliers = None if best is None else best.multipliers()
-        if multipliers is None:
-            return optimality, None, None
-        return optimality, costates(nlp, z, multipliers), _weighted_gain(nlp, z, multipliers)
+        more = (None, None) if multipliers is None else (costates(nlp, z, multipliers), _weighted_gain(nlp, z, multipliers))
+        return optimality, *more
     except Stopped:
         return None, None, None
 

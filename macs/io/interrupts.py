@@ -18,11 +18,12 @@ from threadpoolctl import ThreadpoolController
 
 from transcription.stopping import Asked, Stopped, asked_now, in_words, stopped_by
 
-__all__ = ["Interrupts", "Stopped", "purpose", "spending", "work_on_trajectories"]
+__all__ = ["PURPOSE", "Interrupts", "Stopped", "spending", "work_on_trajectories"]
 
 _AT_ONCE: ContextVar[bool] = ContextVar("interrupted at once", default=False)
 _SPENT: ContextVar[dict[str, float] | None] = ContextVar("spent", default=None)
-_PURPOSE: ContextVar[str] = ContextVar("purpose", default="other")
+PURPOSE: ContextVar[str] = ContextVar("purpose", default="other")
+"""What work is spent on, see `spending`."""
 
 TIME_LIMIT = "time limit"
 """Reason to end work that has taken as long as it may."""
@@ -112,18 +113,13 @@ def spending(what: str) -> Iterator[dict[str, float]]:
     known = _SPENT.get()
     spent = {} if known is None else known
     token, before, began = _SPENT.set(spent), sum(spent.values()), time.perf_counter()
-    inner = _PURPOSE.set(what)
+    inner = PURPOSE.set(what)
     try:
         yield spent
     finally:
         spent[what] = spent.get(what, 0.0) + time.perf_counter() - began - (sum(spent.values()) - before)
         _SPENT.reset(token)
-        _PURPOSE.reset(inner)
-
-
-def purpose() -> str:
-    """What work is spent on here."""
-    return _PURPOSE.get()
+        PURPOSE.reset(inner)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 Result = TypeVar("Result")
 Workers = int | str | Executor
 ALL = "all"
+ALONE = "one process does the work, since the problem cannot be sent to others: "
 TOGETHER = 8
 """Most pieces that a method begins together before it looks at their results, where it decides by these: a part of the method, so that the
 number of processes changes nothing."""
@@ -86,7 +87,7 @@ class Helpers:
 
     def __init__(self, count: int, executor: Executor | None = None) -> None:
         self._count, self._executor, self._given = count, executor, executor is not None
-        self._seconds, self._killed = 0.0, 0
+        self._seconds, self._killed, self._grown = 0.0, 0, 0
         self.batches: list[int] = []  # pieces of each batch so far
         self._taught: dict[str, list[Future[Any]]] = {}
         self._awake: Future[Any] | None = None  # done once there is a process
@@ -146,18 +147,36 @@ class Helpers:
             for future in begun:
                 future.cancel()
             if wait(begun, timeout=1.0).not_done and not self._given and self._executor is not None:
-                self._executor.shutdown(wait=False, kill_workers=True)  # type: ignore[call-arg]
-                self._executor = None
-                self._taught.clear()
+                self._end()
             raise
         finally:
             stop.unlink(missing_ok=True)
+        self._renew()
         return [found[k].result() for k in sorted(found)]
 
     @property
     def _worth(self) -> bool:
         """Whether there was enough work for other processes to pay: a second is what it takes to begin them. Killed twice, they do not."""
-        return self._given or (self._seconds >= 1.0 and self._killed < 2)
+        return self._given or (self._seconds >= 1.0 and self._killed < 2 and self._grown < 2)
+
+    def _renew(self) -> None:
+        """End processes of which one has more than half of its part of the memory, so that others begin; said once. If those of the next
+        batch grow as much, this one goes on alone."""
+        most, sizes = _memory() / (2 * self._count + 2), list[int]()
+        with suppress(OSError):  # other systems do not say it there
+            for process in getattr(self._executor, "_processes", None) or ():
+                sizes.append(int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE"))
+        self._grown = self._grown + 1 if max(sizes, default=0) > most else 0
+        if self._grown:
+            self._end()
+            _say(f"processes begin anew when one of them has more than {most / 1e9:.2g} GB of memory")
+
+    def _end(self) -> None:
+        """End all processes; the next piece begins others."""
+        if self._executor is not None:
+            self._executor.shutdown(wait=False, kill_workers=True)  # type: ignore[call-arg]
+        self._executor = None
+        self._taught.clear()
 
     def _packed(self, *parts: Any) -> tuple[bytes, ...]:
         """What others need for pieces, what these share apart: it is learned once for whatever is done with it. None where it cannot be
@@ -167,7 +186,7 @@ class Helpers:
         except Exception as error:
             if self._given:
                 raise
-            _alone(str(error).rsplit("\n", 1)[-1])
+            _say(ALONE + str(error).rsplit("\n", 1)[-1])
             return (b"",) * len(parts)
 
     def _ready(self, left: int, digest: str, data: bytes) -> int:
@@ -182,7 +201,7 @@ class Helpers:
                 wait(self._taught[digest], timeout=0.3)  # this process would have done most of so few by then
         outcomes = [one.exception() for one in self._taught[digest] if one.done()]
         if wrong := [error for error in outcomes if error is not None and not isinstance(error, BrokenProcessPool)]:
-            _alone(str(wrong[0]).rsplit("\n", 1)[-1])
+            _say(ALONE + str(wrong[0]).rsplit("\n", 1)[-1])
             return 0
         return outcomes.count(None)
 
@@ -215,8 +234,8 @@ class Helpers:
         if self._given:
             raise RuntimeError("a process of the executor in `workers` was killed, perhaps for want of memory") from future.exception()
         if self._executor is not None:
-            self._killed, self._executor = self._killed + 1, None
-            self._taught.clear()
+            self._killed += 1
+            self._end()
             words = "" if self._worth else ", by one process from now on"
             log.warning("a process was killed, perhaps for want of memory: its work is done again%s", words)
         return True
@@ -230,9 +249,18 @@ _KEPT: OrderedDict[str, Any] = OrderedDict()
 
 
 @cache
-def _alone(why: str) -> None:
-    """Say once why the problem stays in this process."""
-    log.warning("one process does the work, since the problem cannot be sent to others: %s", why)
+def _say(words: str) -> None:
+    """Say once what is to be known of processes."""
+    log.warning(words)
+
+
+def _memory() -> float:
+    """Bytes of memory of this machine or, if that is less, of its container; infinite where they are not known."""
+    known = [float("inf")]
+    with suppress(OSError, AttributeError, ValueError):
+        known.append(float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")))
+        known.append(float(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return min(known)
 
 
 def _own(count: int) -> Helpers:

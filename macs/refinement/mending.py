@@ -248,13 +248,10 @@ class _Mending:
         """Verified points of tasks side by side, each from the point of a row, on its mesh, or why there is none."""
         meshed = self._meshed(points, np.isin(np.arange(len(points)), [row for row, _ in tasks]))
         found: list[Points | str] = ["did not converge" if row in meshed else "had no mesh to be solved on" for row, _ in tasks]
-        pieces = {
-            k: (from_dict(points[row].transcription or {}), points[row].decision, task)
-            for k, (row, task) in enumerate(tasks)
-            if row in meshed
-        }
-        solved = dict(zip(pieces, self._loop.each(_solved_on, [*pieces.values()]), strict=True))
-        good = {k: one.z for k, one in solved.items() if one is not None and one.status == CONVERGED}
+        own = [(k, points[row], task) for k, (row, task) in enumerate(tasks) if row in meshed]
+        pieces = {k: (from_dict(point.transcription or {}), point.decision, task) for k, point, task in own}
+        solved = self._loop.each(lambda loop, method, z, task: task.solve(loop.solves, loop.programs(method), z), [*pieces.values()])
+        good = {k: one.z for k, one in zip(pieces, solved, strict=True) if one is not None and one.status == CONVERGED}
         new = {k: self._made(points, tasks[k][0], pieces[k][0], z) for k, z in good.items()}
         if new:
             judged = self.marked(Points.concatenate([*new.values()]))
@@ -359,11 +356,6 @@ def _slightly_outside(points: Points, verify: float) -> list[int]:
     little off. A solve on their own mesh, whose program exists already, costs far less than on any other."""
     beyond = (points.simulated_violation > verify) & (points.simulated_violation <= MENDING.slightly) & (points.status == CONVERGED)
     return np.flatnonzero(beyond & (points.defect <= verify) & (missed(points) <= SEARCH.passable).all(axis=1)).tolist()
-
-
-def _solved_on(loop: MeshLoop, method: Meshed, z: np.ndarray, task: Scalarised) -> Solved:
-    """The result of a task from a vector (n,) on a mesh."""
-    return task.solve(loop.solves, loop.programs(method), z)
 
 
 def _strong(loop: MeshLoop, method: Meshed, point: Solved, weights: np.ndarray, scales: np.ndarray) -> Solved | None:

@@ -28,7 +28,7 @@ from transcription.trajectories.trajectory import Trajectory
 
 from ..evaluation.evaluator import CONVERGED, Counts
 from ..gradients.scalarised import WORK, GradientSolves, LexicographicEnd, Scalarised, Start, best_of
-from ..io.interrupts import purpose, spending
+from ..io.interrupts import PURPOSE, spending
 from ..io.workers import each
 from ..pareto.dominance import objective_units, stated_scales
 
@@ -218,7 +218,7 @@ class MeshLoop:
         """`do(loop, *piece)` of independent pieces side by side (`io.workers`), each with a loop of its own that may do an equal part
         of the work that is left, and at `most` so much; None of one that ended before it gave anything."""
         solves, work = self.solves, min(most, self.left / max(len(pieces), 1))
-        limits = purpose(), solves.tolerance, solves.max_iterations, self.wanted, self.limit, work, self.enough, self.more
+        limits = PURPOSE.get(), solves.tolerance, solves.max_iterations, self.wanted, self.limit, work, self.enough, self.more
         found = each(_alone, self.programs, [(self.programs.sizes, *limits, do, *piece) for piece in pieces])
         for _, counts, sizes in found:
             solves.counts, self.programs.sizes = solves.counts.joined(counts), self.programs.sizes | sizes

@@ -24,7 +24,7 @@ from transcription.stopping import stopped_by, stopping
 def eager(monkeypatch) -> None:
     """Other processes begin at once, and anew."""
     monkeypatch.setattr(module, "_OWN", {})
-    monkeypatch.setattr(Helpers, "_worth", property(lambda self: self._killed < 2))
+    monkeypatch.setattr(Helpers, "_worth", property(lambda self: self._killed < 2 and self._grown < 2))
 
 
 def until(happened) -> Iterator[None]:
@@ -132,6 +132,18 @@ def test_what_a_killed_process_had_is_done_again(eager, caplog):
             assert each(killed_elsewhere, os.getpid(), [(k,) for k in range(4)]) == [0, 1, 2, 3]
         assert each(killed_elsewhere, os.getpid(), [(k,) for k in range(4)]) == [0, 1, 2, 3]
     assert [record.getMessage().endswith("by one process from now on") for record in caplog.records] == [False, True]
+
+
+def test_processes_that_have_grown_begin_anew_and_where_that_does_not_help_this_one_goes_on_alone(eager, monkeypatch, caplog):
+    monkeypatch.setattr(module, "_memory", lambda: 1.0)
+    module._say.cache_clear()
+    with caplog.at_level(logging.WARNING), processes(2) as helpers:
+        assert helpers is not None
+        for _ in until(lambda: helpers._grown == 2):
+            assert each(lambda ten, k: ten * k, 10, [(k,) for k in range(4)]) == [0, 10, 20, 30] and helpers._executor is None
+        assert {*each(lambda _, k: os.getpid(), 10, [(k,) for k in range(4)])} == {os.getpid()}
+    (said,) = [record.getMessage() for record in caplog.records]
+    assert said.startswith("processes begin anew when one of them has more than") and said.endswith("GB of memory")
 
 
 @pytest.mark.parametrize("wrong", [0, -1, 1.5, True, "some"])
