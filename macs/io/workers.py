@@ -35,6 +35,7 @@ Result = TypeVar("Result")
 Workers = int | str | Executor
 ALL = "all"
 ALONE = "one process does the work, since the problem cannot be sent to others: "
+UNGUARDED = "where processes are spawned, a script needs `if __name__ == '__main__':` before what begins them"
 TOGETHER = 8
 """Most pieces that a method begins together before it looks at their results, where it decides by these: a part of the method, so that the
 number of processes changes nothing."""
@@ -87,7 +88,7 @@ class Helpers:
 
     def __init__(self, count: int, executor: Executor | None = None) -> None:
         self._count, self._executor, self._given = count, executor, executor is not None
-        self._seconds, self._killed, self._grown = 0.0, 0, 0
+        self._seconds, self._killed, self._grown, self._answered = 0.0, 0, 0, False
         self.batches: list[int] = []  # pieces of each batch so far
         self._taught: dict[str, list[Future[Any]]] = {}
         self._awake: Future[Any] | None = None  # done once there is a process
@@ -230,9 +231,11 @@ class Helpers:
     def _lost(self, future: Future[Any]) -> bool:
         """Whether a piece is to be done again, since its process was killed, which is said."""
         if not (future.cancelled() or isinstance(future.exception(), BrokenProcessPool)):
+            self._answered = True
             return False
         if self._given:
-            raise RuntimeError("a process of the executor in `workers` was killed, perhaps for want of memory") from future.exception()
+            why = "was killed, perhaps for want of memory" if self._answered else f"ended before it did any work: {UNGUARDED}"
+            raise RuntimeError(f"a process of the executor in `workers` {why}") from None
         if self._executor is not None:
             self._killed += 1
             self._end()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
@@ -103,6 +105,27 @@ def test_an_executor_does_all_of_the_work():
         assert threading.get_ident() not in each(lambda _, k: threading.get_ident(), None, [(k,) for k in range(9)])
         with pytest.raises(ZeroDivisionError):
             each(divmod, 100, [(k,) for k in (3, 0, 5, "seven", 0)])
+
+
+class Breaking(ThreadPoolExecutor):
+    """An executor whose processes end after so many pieces."""
+
+    left = 0
+
+    def submit(self, do, *arguments):
+        self.left -= 1
+        return super().submit(do if self.left >= 0 else broken, *arguments)
+
+
+def broken(*_: object) -> None:
+    raise BrokenProcessPool
+
+
+@pytest.mark.parametrize(("done", "why"), [(0, "needs `if __name__ == '__main__':`"), (3, "was killed, perhaps for want of memory")])
+def test_why_processes_of_an_executor_ended(done, why):
+    with Breaking(1) as threads, processes(threads), pytest.raises(RuntimeError, match=re.escape(why)):
+        threads.left = done
+        each(divmod, 100, [(k,) for k in range(1, 20)])
 
 
 def test_where_the_work_is_to_end_pieces_are_asked_to():
