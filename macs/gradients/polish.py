@@ -87,37 +87,28 @@ def polish(
     pool, span = archive, ranges(archive.F)
     archive = _thinned(pool, limit, exponent, guide)
     for _ in range(POLISH.rounds):
-        before, known, pool = archive, pool, _slid(archive, pool, solves, span, limit, exponent, guide)
-        archive = _thinned(pool, limit, exponent, guide)
-        if pool is known or np.array_equal(before.F, archive.F):
+        with spending("gaps"):
+            references, starts, gaps = _slide(archive, limit, exponent, guide)
+            if not (len(references) and solves.left):
+                break
+            found = solves(starts, references, np.tile(span, (len(references), 1)))
+            new = Archive.of(found, solves.feasible(found))
+            failed = gaps[np.flatnonzero(found.status[: len(gaps)] != CONVERGED)]
+            if len(failed) and solves.left:
+                near, far = failed.ravel(), failed[:, ::-1].ravel()
+                nearer = archive.F[near] + POLISH.nearer * (archive.F[far] - archive.F[near])
+                found = solves(archive.Z[near], nearer, np.tile(span, (len(near), 1)))
+                new = new.joined(Archive.of(found, solves.feasible(found)))
+            known, pool = pool, _front(pool.joined(new), span)
+            solves.results.keep(among(new.F, pool.F) & ~among(new.F, known.F))
+        before, archive = archive, _thinned(pool, limit, exponent, guide)
+        if np.array_equal(before.F, archive.F):
             break
     archive = archive if alike else _helped_by_neighbours(archive, solves, extremes(archive.F))
     archive = _with_other_values(archive, solves)
     if len(waiting):
         archive = _thinned(_front(archive.joined(waiting), span), limit, exponent, guide)
     return archive
-
-
-@spending("gaps")
-def _slid(
-    archive: Archive, pool: Archive, solves: BudgetedSolves, span: np.ndarray, limit: int, exponent: float | None, guide: Guide | None
-) -> Archive:
-    """The pool with the results of solves by which points of an archive slide along the front, and of those in its gaps; the pool itself
-    without any."""
-    references, starts, gaps = _slide(archive, limit, exponent, guide)
-    if not (len(references) and solves.left):
-        return pool
-    found = solves(starts, references, np.tile(span, (len(references), 1)))
-    new = Archive.of(found, solves.feasible(found))
-    failed = gaps[np.flatnonzero(found.status[: len(gaps)] != CONVERGED)]
-    if len(failed) and solves.left:
-        near, far = failed.ravel(), failed[:, ::-1].ravel()
-        nearer = archive.F[near] + POLISH.nearer * (archive.F[far] - archive.F[near])
-        found = solves(archive.Z[near], nearer, np.tile(span, (len(near), 1)))
-        new = new.joined(Archive.of(found, solves.feasible(found)))
-    both = _front(pool.joined(new), span)
-    solves.results.keep(among(new.F, both.F) & ~among(new.F, pool.F))
-    return both
 
 
 def _thinned(pool: Archive, limit: int, exponent: float | None, guide: Guide | None) -> Archive:

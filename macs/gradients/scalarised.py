@@ -158,19 +158,13 @@ def strongly_optimal(
 ) -> Solved:
     """A point, or a better one: a point that is optimal with a positive weight (m,) on every objective is Pareto optimal; of another, the
     objectives without weight are minimised once, the others kept. ranges (m,)."""
-    left = weightless(weights, ranges)
-    if not left.any():
+    sizes = weights * ranges
+    left = (sizes <= END.weightless * sizes.sum()) & (ranges > 0)
+    if not left.any() or left.all():
         return point
     task = Scalarised(np.where(left, point.F, np.inf), ranges, np.where(left, np.inf, point.F))
     found = without_loss(solve, tolerance, point, task, END.slack * ranges)
     return found if found.message != WEAK else point
-
-
-def weightless(weights: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-    """Mask (m,) of the objectives without weight at a point that is optimal with these; none if all are."""
-    sizes = weights * ranges
-    left = (sizes <= END.weightless * sizes.sum()) & (ranges > 0)
-    return left & ~left.all()
 
 
 @dataclass(frozen=True, eq=False)

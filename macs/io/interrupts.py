@@ -22,8 +22,7 @@ __all__ = ["PURPOSE", "Interrupts", "Stopped", "spending", "work_on_trajectories
 
 _AT_ONCE: ContextVar[bool] = ContextVar("interrupted at once", default=False)
 _SPENT: ContextVar[dict[str, float] | None] = ContextVar("spent", default=None)
-PURPOSE: ContextVar[str] = ContextVar("purpose", default="other")
-"""What work is spent on, see `spending`."""
+PURPOSE: ContextVar[str] = ContextVar("purpose", default="other")  # what work is spent on, see `spending`
 
 TIME_LIMIT = "time limit"
 """Reason to end work that has taken as long as it may."""

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from transcription import from_dict
-from transcription.base import Transcription
 from transcription.inner import Propagate
 from transcription.meshed import Meshed
 from transcription.meshes.verdict import Wanted
@@ -27,7 +26,7 @@ from ..fronts.points import Points
 from ..fronts.provenance import more_costs
 from ..fronts.verified import Simulations, feasible_as_simulated, largest_miss, missed, objective_scales, untrusted, verified
 from ..gradients.front_polish import KEPT_INSIDE, back_off
-from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal, weightless
+from ..gradients.scalarised import WORK, GradientSolves, Scalarised, strongly_optimal
 from ..io.console import working
 from ..io.interrupts import spending
 from ..io.workers import TOGETHER
@@ -233,36 +232,27 @@ class _Mending:
         return points
 
     def _between(self, points: Points, targets: Sequence[np.ndarray], scales: np.ndarray) -> list[Points | str]:
-        """For each of some targets (m,) a verified point, from the verified ones nearest to it in turn, or why there is none."""
-        rows, found = np.flatnonzero(points.verified), list[Points | str]([""] * len(targets))
-        apart = np.linalg.norm((points.simulated_F[rows] - np.array(targets)[:, None]) / scales, axis=2)
-        near = rows[np.argsort(apart, axis=1, kind="stable")]
-        for k in range(min(MENDING.starts, len(rows))):
-            left = [i for i, one in enumerate(found) if not isinstance(one, Points)]
-            tasks = [(int(near[i, k]), Scalarised(targets[i], scales, units=scales)) for i in left]
-            for i, one in zip(left, self._solved(points, tasks), strict=True):
-                found[i] = one
+        """For each of some targets (m,), side by side, a verified point, by solves from the verified points nearest to it in turn, on their
+        meshes, or why there is none."""
+        good, found = np.flatnonzero(points.verified), list[Points | str](["had no mesh to be solved on"] * len(targets))
+        apart = np.linalg.norm((points.simulated_F[good] - np.array(targets)[:, None]) / scales, axis=2)
+        near, meshed = good[np.argsort(apart, axis=1, kind="stable")].tolist(), self._meshed(points, points.verified)
+        for k in range(min(MENDING.starts, len(good))):
+            begun = {i: near[i][k] for i, one in enumerate(found) if isinstance(one, str) and near[i][k] in meshed}
+            starts = [(from_dict(points[row].transcription or {}), points[row].decision) for row in begun.values()]
+            pieces = [(*start, Scalarised(targets[i], scales, units=scales)) for i, start in zip(begun, starts, strict=True)]
+            solved = self._loop.each(lambda loop, method, z, task: task.solve(loop.solves, loop.programs(method), z), pieces)
+            new = dict[int, Points]()
+            for (i, row), (method, _), one in zip(begun.items(), starts, solved, strict=True):
+                found[i] = "did not converge"
+                if one is not None and one.status == CONVERGED:
+                    new[i] = from_vectors(self.programs(method), one.z[None], points.solver, points.stats, **_judged(points[[row]]))
+            if new:
+                judged = self.marked(Points.concatenate([*new.values()]))
+                judged = self._as_simulated(self._inside(judged, _slightly_outside(judged, self.verify)), SEARCH.passable)
+                for row, i in enumerate(new):
+                    found[i] = judged[[row]] if judged.verified[row] else "not confirmed by simulation"
         return found
-
-    def _solved(self, points: Points, tasks: Sequence[tuple[int, Scalarised]]) -> list[Points | str]:
-        """Verified points of tasks side by side, each from the point of a row, on its mesh, or why there is none."""
-        meshed = self._meshed(points, np.isin(np.arange(len(points)), [row for row, _ in tasks]))
-        found: list[Points | str] = ["did not converge" if row in meshed else "had no mesh to be solved on" for row, _ in tasks]
-        own = [(k, points[row], task) for k, (row, task) in enumerate(tasks) if row in meshed]
-        pieces = {k: (from_dict(point.transcription or {}), point.decision, task) for k, point, task in own}
-        solved = self._loop.each(lambda loop, method, z, task: task.solve(loop.solves, loop.programs(method), z), [*pieces.values()])
-        good = {k: one.z for k, one in zip(pieces, solved, strict=True) if one is not None and one.status == CONVERGED}
-        new = {k: self._made(points, tasks[k][0], pieces[k][0], z) for k, z in good.items()}
-        if new:
-            judged = self.marked(Points.concatenate([*new.values()]))
-            judged = self._as_simulated(self._inside(judged, _slightly_outside(judged, self.verify)), SEARCH.passable)
-            for i, k in enumerate(new):
-                found[k] = judged[[i]] if judged.verified[i] else "not confirmed by simulation"
-        return found
-
-    def _made(self, points: Points, row: int, method: Transcription, z: np.ndarray, **more: Any) -> Points:
-        """A vector (n,) on a mesh as a point that is judged as that of a row."""
-        return from_vectors(self.programs(method), z[None], points.solver, points.stats, **_judged(points[[row]]), **more)
 
     @_unless_stopped
     def strong(self, points: Points) -> Points:
@@ -270,22 +260,20 @@ class _Mending:
         weight on every objective, the objectives without are minimised once. `points` itself if none is better."""
         m, scales, better = points.F.shape[1], objective_scales(points), dict[int, Points]()
         best = extremes(points.F) if len(points) else np.zeros(0)
-        most, pieces = self._solves.counts.work + min(self._most_work(points, 0), WORK.most), list[tuple[int, Any]]()
+        most = self._solves.counts.work + min(self._most_work(points, 0), WORK.most)
         for i in self._meshed(points, points.verified) if m > 1 and differentiable(self.programs.problem) else ():
             own = points[i].weights
             weights = (best == i).astype(float) if own is None else np.array(list(own.values()))
-            if (weights > 0).any() and weightless(weights, scales).any():
-                point = Solved(points[i].decision, points[i].F, points[i].violation, CONVERGED, 0)
-                pieces.append((i, (from_dict(points[i].transcription or {}), point, weights, scales)))
-        for k in range(0, len(pieces), TOGETHER // 2):
-            some = pieces[k : k + TOGETHER // 2]
-            if self._solves.counts.work >= most or stopping():
-                break
-            for (i, (method, *_)), found in zip(some, self._loop.each(_strong, [piece for _, piece in some]), strict=True):
-                if found is not None:
-                    certificate = certified(self.programs(method), found.z[None], scales)
-                    new = self.marked(self._made(points, i, method, found.z, **certificate))
-                    better |= {i: new} if new.verified[0] else {}
+            if not (weights > 0).any() or self._solves.counts.work >= most or stopping():
+                continue
+            nlp = self.programs(from_dict(points[i].transcription or {}))
+            point = Solved(points[i].decision, points[i].F, points[i].violation, CONVERGED, 0)
+            with self._solves.at_most(MENDING.patience):
+                found = strongly_optimal(partial(self._solves, nlp), self._solves.tolerance, point, weights, scales)
+            if found is not point:
+                certificate = certified(nlp, found.z[None], scales)
+                new = self.marked(from_vectors(nlp, found.z[None], points.solver, points.stats, **certificate, **_judged(points[[i]])))
+                better |= {i: new} if new.verified[0] else {}
         self._solves.counts.keep(len(better))
         if not better:
             return points
@@ -356,13 +344,6 @@ def _slightly_outside(points: Points, verify: float) -> list[int]:
     little off. A solve on their own mesh, whose program exists already, costs far less than on any other."""
     beyond = (points.simulated_violation > verify) & (points.simulated_violation <= MENDING.slightly) & (points.status == CONVERGED)
     return np.flatnonzero(beyond & (points.defect <= verify) & (missed(points) <= SEARCH.passable).all(axis=1)).tolist()
-
-
-def _strong(loop: MeshLoop, method: Meshed, point: Solved, weights: np.ndarray, scales: np.ndarray) -> Solved | None:
-    """What is better than a point on a mesh by `strongly_optimal`, if anything is."""
-    with loop.solves.at_most(MENDING.patience):
-        found = strongly_optimal(partial(loop.solves, loop.programs(method)), loop.solves.tolerance, point, weights, scales)
-    return None if found is point else found
 
 
 def _inside_limits(programs: Programs, points: Points, rows: Sequence[int], verify: float, loss: float) -> tuple[Points, Counts]:

@@ -59,14 +59,14 @@ def test_a_search_with_few_points_gets_more_in_their_gaps(unverified) -> None:
 @pytest.mark.parametrize(
     ("step", "result", "why"),
     [
-        ("_solved", "did not converge", "solves for more: 1 did not converge; all gaps were tried."),
+        ("_between", "did not converge", "solves for more: 1 did not converge; all gaps were tried."),
         ("_most_work", 0.0, "the work for more was used up."),
     ],
 )
 def test_a_front_says_why_points_are_missing(unverified, monkeypatch, step, result, why) -> None:
     few = unverified.verify(1e-3)
     few = few[np.flatnonzero(few.verified)[[0, -1]]]
-    monkeypatch.setattr(mending._Mending, step, lambda job, points, tasks, *_: [result] * len(tasks) if step == "_solved" else result)
+    monkeypatch.setattr(mending._Mending, step, lambda job, points, tasks, *_: [result] * len(tasks) if step == "_between" else result)
     assert mending.mended(few, 1e-3, size=5).message.endswith(f"2 of 5 points were found; {why}")
 
 
