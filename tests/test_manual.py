@@ -36,6 +36,7 @@ SLOW = (
     "docs/choosing.md",
     "docs/clusters.md",
     "docs/costates.md",
+    "docs/curve.md",
     "docs/files.md",
     "docs/first-steps.md",
     "docs/meshes.md",

@@ -163,11 +163,9 @@ def _between(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list
     if len(crossings) != 1:
         return nothing
     k = crossings[0]
-    # Where a constraint takes over from another, both sides would be lower beyond their corner: it is where they cross themselves.
-    corner = lower[k] > upper[k]
-    difference = left(places)[0] - right(places)[0] if corner else lower - upper
-    place = places[k] + (places[k + 1] - places[k]) * difference[k] / (difference[k] - difference[k + 1])
-    to = (place, place) if corner else (min(place, a), max(place, b))
+    share = (lower - upper)[k] / ((lower - upper)[k] - (lower - upper)[k + 1])
+    place = places[k] + (places[k + 1] - places[k]) * share
+    to = min(place, a), max(place, b)
     edges = []
     for one, rival, begin, until in ((left, left_rival, start, to[0]), (right, right_rival, end, to[1])):
         height, slope = one(until)

@@ -37,7 +37,7 @@ class CurveTrace:
 
     def go(self) -> list[Solved]:
         """All results, after points were solved until the curve errs by less than is wanted, or until there is nothing more to solve."""
-        places = (0.5 - 0.5 * np.cos(np.arange(1, 6) * np.pi / 6)).tolist()  # Chebyshev's
+        places = (0.5 - 0.5 * np.cos(np.arange(1, 4) * np.pi / 4)).tolist()  # Chebyshev's
         self._keep(places, solve_tasks(self._solver, [self._task(place) for place in places]))
         while (places := self._next()) and len(self.found) < LATTICE_SIZE and not stopping():
             self._solve(places)

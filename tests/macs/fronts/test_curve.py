@@ -94,6 +94,15 @@ def test_pieces_end_at_kinks(shape, place, count):
     assert curve.distances(seen(shape(np.linspace(0, 1, 1000))[0])).max() <= curve.error < 1e-3
 
 
+def test_interpolants_that_agree_are_no_proof():
+    # A parabola over the line between the ends: no interpolant differs from it. Something may hide between so few points all the same.
+    s = np.linspace(0, 1, 5)
+    h, slopes = 0.3 * ((2 * s - 1) ** 2 - 1), 1.2 * (2 * s - 1)
+    inside = np.abs(slopes) < 1
+    f = np.column_stack([s + h, 1 - s + h])[inside]
+    assert 1e-4 < front(f, -(1 - slopes[inside]) / (1 + slopes[inside])).curve().error < 1e-2
+
+
 def test_a_gap_is_where_a_side_would_be_dominated_by_itself():
     # The first arc is at its lowest at x = 0.4; the second one is as low as that at x = 0.6.
     def arcs(x):
