@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from carts import MESH, cart
-from synthetic_fronts import flights
+from synthetic_fronts import flights, marked
 
 import macs
 from macs import Front, sweep
@@ -351,6 +351,9 @@ def test_a_run_that_died_goes_on_from_its_checkpoint(capsys, refused, monkeypatc
 def test_show_prints_draws_and_exports(capsys):
     front = flights(3)
     front.replace(stats=front.stats | {"solves_for": {"ends": 3}, "iterations_for": {"ends": 41}, "kept_for": {"ends": 1}}).save("front.nc")
+    marked(front, [True] * 3).save("good.nc")
+    for options in ([], ["--details"]):
+        assert main(["show", "good.nc", *options]) == 0 and ("defect" in capsys.readouterr().out) == bool(options)
     assert main(["show", "front.nc", "--plot", "a.pdf", "--csv", "a.csv"]) == 0
     out = capsys.readouterr().out
     assert (
