@@ -10,6 +10,7 @@ const KINDS = {
 };
 const WIDTHS = [2, 1.6, 1.6, 1.6, 1.6, 1.6, 1.6];
 
+let panels = []; // those that are there: the place, the quantity, the title and the traces of each
 let drawing = 0; // number of the latest drawing: an earlier one that is still loading gives up
 
 async function showFlights() {
@@ -55,6 +56,7 @@ function clearPanels() {
   const place = byId("flights-plot");
   place.querySelectorAll(".panel-plot").forEach(retire);
   place.replaceChildren();
+  panels = [];
 }
 
 /** Which colour is which point, and what lines mean. */
@@ -89,26 +91,37 @@ function groups(flights) {
     .map((title) => [title, [...found.get(title).values()]]);
 }
 
+/** Draw all panels; where these are of the same quantities as before, in the same places. */
 function drawPanels(flights, all) {
-  const place = byId("flights-plot");
-  clearPanels();
-  panels = [];
-  if (!canDraw()) return;
-  for (const [title, quantities] of groups(flights)) {
-    const grid = element("div", { class: "panels" });
-    place.append(element("h3", {}, title), grid);
-    for (const quantity of quantities) {
-      const figure = panelFigure(flights, quantity, all);
-      const plot = element("div", { class: "panel-plot", role: "img", "aria-label": figure.words });
-      grid.append(element("div", { class: "panel" }, element("p", { class: "panel-title" }, figure.title, " ", element("span", { class: "note" }, figure.limits)), plot));
-      panels.push({ plot, quantity, traces: figure.traces });
-      drawWhenSeen(plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
-    }
-  }
+  if (!canDraw()) return clearPanels();
+  const found = groups(flights);
+  const quantities = found.flatMap(([, ones]) => ones);
+  const word = ({ kind, name, unit }) => JSON.stringify([kind, name, unit]);
+  if (quantities.map(word).join() !== panels.map(({ quantity }) => word(quantity)).join()) buildPanels(found);
+  clearTimeout(slide.rest); // what it would draw is drawn now
+  panels.forEach((panel, k) => {
+    const figure = panelFigure(flights, quantities[k], all);
+    Object.assign(panel, { quantity: quantities[k], traces: figure.traces });
+    panel.plot.setAttribute("aria-label", figure.words);
+    fill(panel.title, figure.title, " ", element("span", { class: "note" }, figure.limits));
+    drawWhenSeen(panel.plot, figure.traces, figure.layout, { ...CONFIG, displayModeBar: false });
+  });
   byId("flights").dataset.drawn = flights.flatMap(({ key }) => key ?? []).join(" "); // for tests and style sheets
 }
 
-let panels = []; // those that are there: the place, the quantity and the traces of each
+/** Empty places for panels, in groups. */
+function buildPanels(found) {
+  clearPanels();
+  for (const [title, quantities] of found) {
+    const grid = element("div", { class: "panels" });
+    byId("flights-plot").append(element("h3", {}, title), grid);
+    for (const quantity of quantities) {
+      const panel = { quantity, title: element("p", { class: "panel-title" }), plot: element("div", { class: "panel-plot", role: "img" }) };
+      grid.append(element("div", { class: "panel" }, panel.title, panel.plot));
+      panels.push(panel);
+    }
+  }
+}
 
 /** Everything of a panel: its traces, layout, title, limits as text, and the same in words. Its axes have room for `all` flights. */
 function panelFigure(flights, { name, kind, unit }, all) {
