@@ -8,15 +8,16 @@ both sides, extrapolated, explain the points by far better than one smooth curve
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from ..pareto.dominance import BETTER
 
-Polynomial = Callable[[np.ndarray | float], tuple[np.ndarray, np.ndarray]]  # heights and slopes at places
+Polynomial = Any  # scipy's: heights at places by a call, slopes by its `derivative`
 
 
 @dataclass(frozen=True)
@@ -78,14 +79,15 @@ class _Run:
         from scipy.interpolate import KroghInterpolator  # slow to import
 
         data = [(self.s[i], value) for i in points for value in ((self.h[i],) if i in free else (self.h[i], self.d[i]))]
-        polynomial = KroghInterpolator(*np.array(data).T)
-        return lambda places: (polynomial(places), polynomial.derivative(places))
+        return KroghInterpolator(*np.array(data).T)
 
     def known(self) -> _Run:
         """The same with slopes at its sides from the points beside where these contradict them: there they may be one of several."""
         d, n, inferred = self.d.copy(), len(self.s), list[int]()
         for i, step in ((0, 1), (n - 1, -1)) if n > 2 else ():
-            likely, rough = (float(self.through(*near, free=[i])(self.s[i])[1]) for near in ((i, i + step, i + 2 * step), (i, i + step)))
+            likely, rough = (
+                float(self.through(*near, free=[i]).derivative(self.s[i])) for near in ((i, i + step, i + 2 * step), (i, i + step))
+            )
             if FIT.better * abs(d[i] - likely) > abs(likely - rough):
                 d[i] = np.clip(likely, -1.0, 1.0)
                 inferred.append(i)
@@ -157,8 +159,8 @@ def _between(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list
     places = np.linspace(start, end, 257)
     # Beyond where it is horizontal or vertical in the objectives, a side is dominated: what follows there is a gap.
     a, b = _admissible(left, places), _admissible(right, places[::-1])
-    lower = np.where(places <= a, left(places)[0], left(a)[0] + places - a)
-    upper = np.where(places >= b, right(places)[0], right(b)[0] + b - places)
+    lower = np.where(places <= a, left(places), left(a) + places - a)
+    upper = np.where(places >= b, right(places), right(b) + b - places)
     (crossings,) = np.nonzero(np.diff(np.sign(lower - upper)) != 0)
     if len(crossings) != 1:
         return nothing
@@ -168,7 +170,7 @@ def _between(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list
     to = min(place, a), max(place, b)
     edges = []
     for one, rival, begin, until in ((left, left_rival, start, to[0]), (right, right_rival, end, to[1])):
-        height, slope = one(until)
+        height, slope = one(until), one.derivative(until)
         error = _apart(one, [rival], *sorted((begin, until)))
         edges.append((float(until), float(height), float(np.clip(slope, -1.0, 1.0)), error))
     if abs(edges[0][2] - edges[1][2]) < 0.5 * abs(known.d[i + 1] - known.d[i]) + BETTER and to[0] == to[1]:  # no kink
@@ -182,7 +184,7 @@ def _between(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list
 
 def _admissible(one: Polynomial, places: np.ndarray) -> float:
     """The place up to which a side, extrapolated, is not dominated by itself."""
-    left = 1.0 - np.sign(places[-1] - places[0]) * one(places)[1]
+    left = 1.0 - np.sign(places[-1] - places[0]) * one.derivative(places)
     (beyond,) = np.nonzero(left <= 0.0)
     if not len(beyond) or not beyond[0]:
         return float(places[beyond[0]] if len(beyond) else places[-1])
@@ -196,7 +198,7 @@ def _at_point(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, lis
     for step in (-1, 1):
         near, far = i + step, i + 2 * step
         likely, rough = known.through(far, near, i, free=[i]), known.through(near, i, free=[i])
-        slopes.append(float(likely(known.s[i])[1]))
+        slopes.append(float(likely.derivative(known.s[i])))
         unsure.append(_apart(likely, [rough], *sorted((known.s[near], known.s[i]))))
     d, e = run.d[: i + 1].copy(), run.d[i:].copy()
     d[-1], e[0] = np.clip(slopes, -1.0, 1.0)
@@ -206,8 +208,8 @@ def _at_point(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, lis
 def _apart(one: Polynomial, others: Sequence[Polynomial], start: float, end: float) -> float:
     """The distances of a polynomial from others along its normal between two places, added up, and what solves leave."""
     places = np.linspace(start, end, 17)
-    heights, slopes = one(places)
-    return BETTER + sum(float((_normal(slopes) * np.abs(heights - other(places)[0])).max()) for other in others)
+    heights, normal = one(places), _normal(one.derivative(places))
+    return BETTER + sum(float((normal * np.abs(heights - other(places))).max()) for other in others)
 
 
 def _normal(slopes: np.ndarray) -> np.ndarray:
