@@ -37,7 +37,7 @@ def test_a_point_has_the_value_that_is_asked_for_and_the_best_other_one(T):
 
 
 def test_a_solve_that_begins_with_multipliers_takes_few_iterations():
-    assert front().at({"time": 2.0}).stats["inner_iterations"] <= 6
+    assert front().at({"time": 2.5}).stats["inner_iterations"] <= 3, "4 without the prediction, more without multipliers"
 
 
 @pytest.mark.parametrize(("e", "t"), [(1.0, 1.0), (1.0, 10.0), (0.05, 1.0)])
@@ -83,7 +83,8 @@ def test_a_dense_front_has_even_steps_and_is_exact():
     assert F[:, 0] == pytest.approx([effort(T) for T in F[:, 1]], rel=1e-4)
     steps = np.diff((F / np.ptp(front().objectives, axis=0)) @ [1.0, -1.0])
     assert steps == pytest.approx(np.full(32, 2 / 32), rel=1e-3)
-    assert dense.stats["gradient_solves"] > front().stats["gradient_solves"]
+    solves, iterations = (dense.stats[name] - front().stats[name] for name in ("gradient_solves", "inner_iterations"))
+    assert solves == 31 and iterations <= 80, "more where places are not taken from the middle of gaps on"
 
 
 # Two valleys
