@@ -404,7 +404,7 @@ class _Job:
         if trace is None:
             return self.sifted([*ends, *found], ranges)
         front, left = self.sifted(trace.points() or trace.found, ranges), trace.curve.error
-        missed = f"the curve errs by about {left:.1e} of the ranges, and not by less than {error:g}" if left > trace.wanted else ""
+        missed = "" if left <= trace.wanted else f"the curve errs by about {left:.1e} of the ranges, and not by less than {error:g}"
         gaps = [sorted(float(front.signs[0] * one.F[0]) for one in gap) for gap in trace.gaps]
         return front.replace(stats=front.stats | {GAPS: gaps}, message="; ".join(filter(None, [front.message, missed])))
 

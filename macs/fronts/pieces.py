@@ -164,9 +164,8 @@ def _between(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list
     (crossings,) = np.nonzero(np.diff(np.sign(lower - upper)) != 0)
     if len(crossings) != 1:
         return nothing
-    k = crossings[0]
-    share = (lower - upper)[k] / ((lower - upper)[k] - (lower - upper)[k + 1])
-    place = places[k] + (places[k + 1] - places[k]) * share
+    k, apart = crossings[0], lower - upper
+    place = places[k] + (places[k + 1] - places[k]) * apart[k] / (apart[k] - apart[k + 1])
     to = min(place, a), max(place, b)
     edges = []
     for one, rival, begin, until in ((left, left_rival, start, to[0]), (right, right_rival, end, to[1])):
@@ -185,11 +184,9 @@ def _between(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list
 def _admissible(one: Polynomial, places: np.ndarray) -> float:
     """The place up to which a side, extrapolated, is not dominated by itself."""
     left = 1.0 - np.sign(places[-1] - places[0]) * one.derivative(places)
-    (beyond,) = np.nonzero(left <= 0.0)
-    if not len(beyond) or not beyond[0]:
-        return float(places[beyond[0]] if len(beyond) else places[-1])
-    k = beyond[0]
-    return float(places[k - 1] + (places[k] - places[k - 1]) * left[k - 1] / (left[k - 1] - left[k]))
+    k = max(int(np.argmax(left <= 0.0)) if left.min() <= 0.0 else len(left) - 1, 1)
+    share = np.clip(left[k - 1] / max(left[k - 1] - left[k], BETTER**2), 0.0, 1.0)
+    return float(places[k - 1] + share * (places[k] - places[k - 1]))
 
 
 def _at_point(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, list[_Run]]:
@@ -197,7 +194,7 @@ def _at_point(run: _Run, known: _Run, i: int, smooth: float) -> tuple[float, lis
     slopes, unsure = [], []
     for step in (-1, 1):
         near, far = i + step, i + 2 * step
-        likely, rough = known.through(far, near, i, free=[i]), known.through(near, i, free=[i])
+        likely, rough = known.through(far, near, i, free=[i]), known.through(far, near)
         slopes.append(float(likely.derivative(known.s[i])))
         unsure.append(_apart(likely, [rough], *sorted((known.s[near], known.s[i]))))
     d, e = run.d[: i + 1].copy(), run.d[i:].copy()

@@ -33,7 +33,7 @@ class CurveTrace:
         self.found, self._tried, self.gaps = list(ends), list[tuple[float, float]](), list[tuple[Solved, Solved]]()
         F = np.array([end.F for end in ends])
         self._ranges = np.ptp(F, axis=0)
-        self.curve = FrontCurve.through(solver.nlp.problem.goals, F, np.ones((2, 2)), [])
+        self.curve = FrontCurve.through(solver.nlp.problem.goals, F, np.full((2, 2), np.nan), [])
 
     def go(self) -> list[Solved]:
         """All results, after points were solved until the curve errs by less than is wanted, or until there is nothing more to solve."""
@@ -76,6 +76,8 @@ class CurveTrace:
     def _next(self) -> list[float]:
         """The next places: where the curve errs most, then kinks and gaps that no solve has seen."""
         points = self.points()
+        if len(points) < 2:
+            return []
         self.gaps = [(a, b) for a, b in pairwise(points) if self._is_gap(self._place(a), self._place(b))]
         F, weights = np.array([one.F for one in points]), np.array([self._weights(one) for one in points])
         self.curve = curve = FrontCurve.through(self.curve.goals, F, weights, [0.5 * (a.F[0] + b.F[0]) for a, b in self.gaps])

@@ -100,6 +100,12 @@ def test_what_was_not_reached_is_told(monkeypatch):
     assert "the curve errs by about" in sweep(two_wells(), MESH, error=1e-6, starts=1).message
 
 
+def test_points_without_rates_are_a_front_without_a_curve(monkeypatch):
+    monkeypatch.setattr("macs.gradient_tools._Job._weights", lambda *arguments, **more: None)
+    found = sweep(two_wells(), MESH, error=1e-2, starts=1)
+    assert len(found) == 5 and "the curve errs by about nan" in found.message
+
+
 def test_any_front_gets_points_until_its_curve_errs_by_less():
     few = sweep(two_wells(), MESH, points=4, starts=1)
     found = few.dense(error=1e-3)
