@@ -60,9 +60,9 @@ class RowCache(sqlite3.Connection):
 
     def add(self, X: Sequence[np.ndarray], values: Sequence[Row]) -> None:
         """Keep the values of rows (d,) that did not raise an error: they may succeed another time, with a licence or more time."""
-        kept = [(row, one) for row, one in zip(X, values, strict=True) if not isinstance(one, str)]
+        pairs = [(row, one) for row, one in zip(X, values, strict=True) if not isinstance(one, str)]
         with self:
-            data = [(self._problem, row.tobytes(), *(part.tobytes() for part in one)) for row, one in kept]
+            data = [(self._problem, row.tobytes(), one[0].tobytes(), one[1].tobytes()) for row, one in pairs]
             self.executemany("INSERT OR REPLACE INTO rows VALUES (?, ?, ?, ?)", data)
 
 

@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -303,10 +304,8 @@ class MultistartSolver:
         integers = self.nlp.integers
         lower, upper = self.nlp.lower[integers], self.nlp.upper[integers]
         few = np.prod(upper - lower + 1.0) <= MULTISTART.values[0]
-        if few:
-            new = [*product(*(np.arange(low, high + 1.0) for low, high in zip(lower, upper, strict=True)))]
-        else:
-            new = [tuple(self.solves(self.nlp.relaxed, best.z, task).z[integers].round())]
+        new: list[Any] = [*product(*map(np.arange, lower, upper + 1.0))] if few else []
+        new = new or [tuple(self.solves(self.nlp.relaxed, best.z, task).z[integers].round())]
         tried, steps = {tuple(best.z[integers])}, np.vstack([np.eye(len(integers)), -np.eye(len(integers))])
         while (new := [one for one in new if one not in tried and self._missed[one] < MULTISTART.values[1]]) and not stopping():
             with self.solves.at_most(MULTISTART.iterations):

@@ -68,9 +68,10 @@ def repair(trials: Trials, seen: Sequence[Evaluation]) -> None:
     if len(rows) > count:
         rows = state.rng.choice(rows, count, replace=False)
     Z, residuals, violation = Z[rows], residuals[rows], violation[rows]
+    watched = residuals != 0.0
     for _ in range(REPAIR_LIMITS.steps):
         X = box.to_unit(Z[:, evaluator.free])
-        moved, result = trials.evaluate(Z, X, box.put_back(X + steps_to_zero(box, X, residuals, state.samples)))
+        moved, result = trials.evaluate(Z, X, box.put_back(X + steps_to_zero(box, X, residuals, state.samples, watched)))
         if result is None:
             break
         assert result.residuals is not None
@@ -78,6 +79,7 @@ def repair(trials: Trials, seen: Sequence[Evaluation]) -> None:
         rows = _promising(state, result.F, result.violation, evaluator.tolerance)
         rows = rows[result.violation[rows] <= REPAIR_LIMITS.lower * violation[moved[rows]]]
         Z, residuals, violation = result.Z[rows], result.residuals[rows], result.violation[rows]
+        watched = watched[moved[rows]] | (residuals != 0.0)
     update_archives(state, trials.seen, trials.settings, evaluator)
     if len(state.archive):
         groups = (usable, trials.seen)
@@ -98,25 +100,26 @@ def _keep_residuals(state: SearchState, trials: Trials, one: Evaluation) -> None
     state.samples = state.samples.joined(trials.box.to_unit(one.Z[fine][:, trials.evaluator.free]), one.residuals[fine])
 
 
-def steps_to_zero(box: UnitBox, X: np.ndarray, residuals: np.ndarray, samples: ResidualSamples) -> np.ndarray:
+def steps_to_zero(box: UnitBox, X: np.ndarray, residuals: np.ndarray, samples: ResidualSamples, watched: np.ndarray) -> np.ndarray:
     """Steps (k, d) from points X (k, d) to the zero of the models of their residuals (k, c), or as near to it as the bounds allow.
 
-    A constraint without a residual at a point has no part in its step. No step is longer than the distance of the farthest point that its
-    models are made of. It is zero where no other point is known.
+    A constraint without a residual at a point has no part in its step, unless it is `watched` (k, c) beside whole numbers. No step is
+    longer than the distance of the farthest point that its models are made of. It is zero where no other point is known. Whole numbers
+    stay as they are where there are real ones: a step back would undo what made the point worth a repair.
     """
     squared = box.squared_distances(X, samples.X)
     squared[squared == 0.0] = np.inf
     count = min(2 * X.shape[1] + 2, MODEL_LIMITS.points)
     order = np.argsort(squared, axis=1, kind="stable")[:, : 2 * count]
-    steps = np.zeros_like(X)
+    steps, moving = np.zeros_like(X), np.ones(X.shape[1]) if box.whole is None or box.whole.all() else ~box.whole
     for row, near in enumerate(order):
         near = near[np.isfinite(squared[row, near])]
-        violated = np.flatnonzero(residuals[row])
+        violated = np.flatnonzero(residuals[row] if moving.all() else watched[row])
         if len(near) and len(violated):
             apart, amount = np.sqrt(squared[row, near]), residuals[row, violated]
             with np.errstate(over="ignore", invalid="ignore"):  # a slope that is no finite number is left out
                 gradients = _gradients(box.difference(samples.X[near], X[row]), samples.residuals[near][:, violated], amount, apart, count)
-                step = _step(box, X[row], amount, gradients)
+                step = _step(box, X[row], amount, gradients * moving)
             steps[row] = step * min(1.0, apart[:count].max() / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
     return steps
 

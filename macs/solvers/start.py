@@ -61,9 +61,9 @@ class Call:
         if self.callback is not None and not callable(self.callback):
             raise ValueError(f"callback must be callable, not {self.callback!r}")
         for name, path in (("checkpoint", self.checkpoint), ("cache", self.cache)):
-            if path is not None and not (isinstance(path, str | PathLike) and str(path)):
-                raise ValueError(f"{name} must be a path, not {path!r}")
             if path is not None:
+                if not isinstance(path, str | PathLike) or not str(path):
+                    raise ValueError(f"{name} must be a path, not {path!r}")
                 check_target(path)
 
 

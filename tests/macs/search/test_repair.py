@@ -8,7 +8,7 @@ from boxes import boxed
 from pymoo.core.problem import Problem
 from pymoo.problems import get_problem
 
-from macs.evaluation.evaluator import Evaluation
+from macs.evaluation.evaluator import Evaluation, UnitBox
 from macs.search import repair as module
 from macs.search.macs import MACS
 from macs.search.settings import Variant
@@ -209,3 +209,14 @@ def test_residuals_have_signs():
     seen = box.evaluate(np.array([[0.5, 0.0], [2.0, 0.0]]))
     assert seen.residuals is not None and np.allclose(seen.residuals * box.problem.sizes, [[-0.75, 0.0], [3.0, 1.0]])
     assert np.array_equal(seen.violation, np.abs(seen.residuals).max(axis=1))
+
+
+def test_whole_numbers_stay_and_what_was_violated_before_is_watched():
+    """x0 is whole; of x1 + x2 <= 0.7 + x0 and x1 >= 0.6 the first is violated, and a step for it is to leave the second as it is."""
+    box = UnitBox(np.zeros(3), np.array([9.0, 1.0, 1.0]), np.zeros(3, dtype=bool), np.arange(3) == 0, np.zeros(3, dtype=bool))
+    X = np.random.default_rng(1).random((30, 3))
+    residuals = np.column_stack([X[:, 1] + X[:, 2] - 0.7 - X[:, 0], 0.6 - X[:, 1]])
+    samples, x = module.ResidualSamples(X, residuals), np.array([[0.0, 0.6, 0.5]])
+    for watched, step in ((np.array([[True, False]]), [0.0, -0.2, -0.2]), (np.ones((1, 2), dtype=bool), [0.0, 0.0, -0.4])):
+        found = module.steps_to_zero(box, x, np.array([[0.4, 0.0]]), samples, watched)
+        assert found[0] == pytest.approx(step, abs=0.02)
