@@ -352,7 +352,7 @@ class MeshSearch:
     def _elsewhere(self, i: int) -> None:
         """Solve from the best optimum, other optima of the coarse mesh and other starts on an even mesh as fine as its own, if that takes
         little work, and refine results that are better than it or, if it is not good, different from it: on a coarse mesh good optima may
-        be hidden among spurious ones. Where starts agree there, only if its own mesh is much finer and a first solve finds a better one.
+        be hidden among spurious ones. Where starts agree there, only from their optimum, and only if its own mesh is much finer.
         """
         loop, optima, before = self.loop, self.tasks[i], self.loop.work
         best, task, budget, found = optima.best, optima.task, max(SEARCH.share * before, WORK.little), list[Solved]()
@@ -382,7 +382,7 @@ class MeshSearch:
                     with loop.solves.at_most(MULTISTART.iterations):
                         found.append(solver.from_vector(nlp.interpolate(trajectory), task))
                     rule.add(task.optimum(found[-1]))
-            if not best.agreed or different(found, best.loss):
+            if not best.agreed:
                 found += solver.drawn(min(found, key=task.rank), task, rule, min(before + budget - loop.work, loop.left))[1]
         if rule.starts > best.rule.starts and found:
             # On the mesh from which the best came no other starts were made.
