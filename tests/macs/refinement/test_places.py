@@ -59,7 +59,7 @@ def test_the_nearest_point_lies_along_the_ranges_from_a_reference(reference, off
 
 @pytest.mark.parametrize(
     ("goals", "T", "words"),
-    [({"time": 0.3}, 0.5, "time 0.3 is out of reach"), ({"time": 9.0}, 4.0, "time 9 "), ({"effort": 0.1}, 4.0, "out of")],
+    [({"time": 0.3}, 0.5, "time 0.3 is out of reach"), ({"time": 9.0}, 4.0, "time 9:"), ({"effort": 0.1}, 4.0, "out of")],
 )
 def test_what_lies_off_the_front_gets_the_nearest_point_on_it_and_is_told_so(goals, T, words, caplog):
     with caplog.at_level(logging.INFO, "macs.refinement.places"):
