@@ -110,6 +110,15 @@ class FrontCurve:
         """Objectives (k, 2, 2) at both ends of each piece, in the user's units and senses."""
         return np.array([self._objectives(part.places[[0, -1]], part.heights[[0, -1]]) for part in self.parts])
 
+    def within(self, error: float = 0.02) -> Self:
+        """The curve where its estimated error is at most this, in ranges: what a picture may show. Elsewhere it has gaps."""
+        parts = [
+            CurvePiece(part.places[a:b], part.heights[a:b], part.slopes[a:b], part.errors[a : b - 1])
+            for part in self.parts
+            for a, b in pairwise([0, *(np.flatnonzero(part.errors > error) + 1).tolist(), len(part.places)])
+        ]
+        return replace(self, parts=tuple(parts))
+
     def sample(self, count: int = 200) -> np.ndarray:
         """Objectives (k, 2) at about so many places along the curve, in the user's units and senses, with a row of NaN in each gap."""
         rows: list[np.ndarray] = []

@@ -87,10 +87,10 @@ def about(front: Front) -> dict[str, Any]:
 
 
 def curve_data(front: Front, samples: int = 160) -> dict[str, Any] | None:
-    """The front as a curve: of each of its pieces places along it with the objectives there, and its points with theirs; None where slopes
-    are not known, or there are not two objectives."""
+    """The front as a curve, where it is known: of each of its pieces places along it with the objectives there, and its points with
+    theirs; None where slopes are not known, or there are not two objectives."""
     try:
-        curve = front.curve()
+        curve = front.curve().within()
     except ValueError:
         return None
     s, h = (one[:, None] for one in curve.placed(front.F))

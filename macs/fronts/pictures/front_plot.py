@@ -158,9 +158,9 @@ def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
 
 
 def _draw_curve(front: Any, ax: Any) -> None:
-    """Draw the curve through points with known slopes, if there is one; its gaps are gaps."""
+    """Draw the curve through points with known slopes, if there is one, where it is known; its gaps are gaps."""
     with suppress(ValueError):
-        ax.plot(*curve_of(front).sample(400).T, color=COLORS[0], lw=1.1, alpha=0.6, zorder=2)
+        ax.plot(*curve_of(front).within().sample(400).T, color=COLORS[0], lw=1.1, alpha=0.6, zorder=2)
 
 
 def _shades(values: np.ndarray) -> Any:

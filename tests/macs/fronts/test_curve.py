@@ -146,6 +146,17 @@ def test_what_is_not_on_the_front_is_left_out_and_told():
         synthetic_fronts.marked(front(*quarter(9)), [True] + [False] * 8).curve()
 
 
+def test_pictures_show_it_where_it_is_known():
+    """Slopes that contradict the points, as of local optima in many valleys: between these nobody knows the front."""
+    f, rates = quarter(9)
+    curve = front(f, rates * np.exp(2 * np.random.default_rng(0).standard_normal(9))).curve()
+    known = curve.within()
+    assert curve.error > 0.1 and known.error < 0.02
+    gap, shown = seen(f[7:9]).mean(axis=0)[0], seen(f[1:3]).mean(axis=0)[0]
+    assert np.isnan(known(gap)).all() and np.isfinite(curve(gap)).all() and np.isfinite(known(shown)).all()
+    assert np.isnan(known.sample()).any() and len(curve.within(1.0).parts) == len(curve.parts)
+
+
 def test_a_curve_is_of_two_objectives():
     with pytest.raises(ValueError, match="a curve is a front of two objectives, and this one has 3: 'f0', 'f1', 'f2'"):
         synthetic_fronts.black_box(m=3).curve()
