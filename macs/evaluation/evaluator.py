@@ -88,14 +88,14 @@ class UnitBox:
         moved = self.unordered & (np.abs(place - place.round()) > 0.05)
         return np.where(self.whole, np.where(moved, free, drawn) / self.span, X)
 
-    def neighbour(self, x: np.ndarray, reach: int, rng: np.random.Generator) -> np.ndarray:
-        """A point near x (d,) that differs in one or a few whole numbers, each by at most `reach`, or in choices."""
+    def neighbours(self, X: np.ndarray, reach: int, rng: np.random.Generator) -> np.ndarray:
+        """Points near X (k, d), each of which differs in one or a few whole numbers, each by at most `reach`, or in choices."""
         assert self.whole is not None and self.unordered is not None
-        moving = self.whole & (rng.random(len(x)) < 1.0 / np.count_nonzero(self.whole))
-        moving[rng.choice(np.flatnonzero(self.whole))] = True
-        step = rng.integers(1, reach + 1, len(x)) * rng.choice([-1.0, 1.0], len(x))
-        place = np.where(self.unordered, np.floor(rng.random(len(x)) * (self.span + 1.0)), np.clip(x * self.span + step, 0.0, self.span))
-        return np.where(moving, place / self.span, x)
+        moving = self.whole & (rng.random(X.shape) < 1.0 / np.count_nonzero(self.whole))
+        moving[np.arange(len(X)), rng.choice(np.flatnonzero(self.whole), len(X))] = True
+        step = rng.integers(1, reach + 1, X.shape) * rng.choice([-1.0, 1.0], X.shape)
+        place = np.where(self.unordered, np.floor(rng.random(X.shape) * (self.span + 1.0)), np.clip(X * self.span + step, 0.0, self.span))
+        return np.where(moving, place / self.span, X)
 
     def put_back(self, X: np.ndarray) -> np.ndarray:
         """The points X (..., d), wrapped where periodic and clipped elsewhere."""

@@ -125,7 +125,7 @@ def try_neighbours(trials: Trials) -> None:
     points = box.to_unit(state.parents.Z[rows][:, trials.evaluator.free])
     first, second, _ = mates(box, points, box.to_unit(state.parents.Z[:, trials.evaluator.free]), state.rng, 0.0)
     along = np.where(box.unordered, first, points + first - second) if len(state.parents) > FEW_MATES else points
-    near = np.array([box.neighbour(one, 1, state.rng) for one in points])
+    near = box.neighbours(points, 1, state.rng)
     trial = np.where(box.whole & (state.rng.random((len(points), 1)) < 0.7), box.put_back(along), near)
     trials.evaluate(state.parents.Z[rows], points, trial)
     update_archives(state, trials.seen, trials.settings, trials.evaluator)

@@ -156,7 +156,7 @@ class Trials:
         for i in range(0 if np.isinf(box.designs) else len(trial)):
             first, reach = trial[i].copy(), 1
             while not fresh(trial[i : i + 1])[0] and reach < 2 * box.span.max():
-                near = np.array([box.neighbour(first, reach, rng) for _ in range(3 * len(first))])
+                near = box.neighbours(np.tile(first, (3 * len(first), 1)), reach, rng)
                 trial[i], reach = near[np.argmax(fresh(near))], 2 * reach
             new[i] = fresh(trial[i : i + 1])[0]
             if not new[i] and box.designs <= 10_000:  # all around are known: any other
