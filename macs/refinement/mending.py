@@ -207,7 +207,7 @@ class _Mending:
             left, targets = most - self._solves.counts.work, list[np.ndarray]()
             each = MENDING.each * float(np.mean([len(variables) for variables in points.places]))
             room = min(TOGETHER // 2, size - int(points.verified.sum()), LOOP.patience - fruitless, max(left / each, 1.0))
-            while len(targets) < room and (target := _target(points, tried, scales, guide)) is not None:
+            while len(targets) < room and (target := _target(points, tried, scales, guide, targets)) is not None:
                 targets, tried = [*targets, target], np.vstack([tried, target])
             if not targets or left <= 0 or stopping():
                 ended = "all gaps were tried" if not targets else "the work for more was used up" if left <= 0 else "the time was over"
@@ -397,10 +397,12 @@ def _needed(points: Points) -> np.ndarray:
     return needed
 
 
-def _target(points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide | None) -> np.ndarray | None:
+def _target(
+    points: Points, tried: np.ndarray, scales: np.ndarray, guide: Guide | None, also: Sequence[np.ndarray] = ()
+) -> np.ndarray | None:
     """The next target (m,): the unverified point nearest to a verified one; without any, the middle of the widest gap between verified
-    points that are neighbours, on the tree of least length that joins all. None if all were tried."""
-    good, others = points.simulated_F[points.verified], points.F[~points.verified]
+    points that are neighbours, on the tree of least length that joins all, and those that will be `also` there. None if all were tried."""
+    good, others = np.vstack([points.simulated_F[points.verified], *also]), points.F[~points.verified]
     others = others[[not (row == tried).all(axis=1).any() for row in others]]
     if len(others):
         return others[np.argmin(np.linalg.norm((others[:, None] - good) / scales, axis=2).min(axis=1))]

@@ -45,6 +45,8 @@ def test_the_widest_gap_is_between_neighbours_whatever_the_number_of_objectives(
     assert first.tolist() == [0.0, 1.0, 0.5] or first.tolist() == [0.5, 1.0, 0.0]
     second = mending._target(good, first[None], np.ones(3), None)  # type: ignore[arg-type]
     assert second.tolist() == [0.5, 0.0, 0.5]
+    third = mending._target(good, np.array([first, second]), np.ones(3), None, [first, second])  # type: ignore[arg-type]
+    assert third is not None and third.tolist() not in [first.tolist(), second.tolist()], "half of what was the widest gap"
     assert mending._target(good, np.array([first, second]), np.ones(3), None) is None  # type: ignore[arg-type]
 
 
@@ -59,7 +61,7 @@ def test_a_search_with_few_points_gets_more_in_their_gaps(unverified) -> None:
 @pytest.mark.parametrize(
     ("step", "result", "why"),
     [
-        ("_between", "did not converge", "solves for more: 1 did not converge; all gaps were tried."),
+        ("_between", "did not converge", "solves for more: 3 did not converge."),
         ("_most_work", 0.0, "the work for more was used up."),
     ],
 )
