@@ -349,7 +349,7 @@ class Front(Points):
 
         Points that are not feasible, not verified (if the front was simulated), dominated, or without `weights` are left out, as the
         curve's `message` says. Without any weights, as of a vector problem or a search without gradients, there is no curve: such points
-        lie above the front by what nobody knows. A front from a file has the same curve.
+        may lie above the front, by an unknown amount. A front from a file has the same curve.
 
         Returns
         -------

@@ -3,7 +3,7 @@
 from .catalogue import describe, is_catalogued, load, names
 from .compiled import CompiledPhase, CompiledProblem, Limit, Link, Objective, Variable
 from .externals import external
-from .models import Fmu, fmu
+from .models import Fmu
 from .phase import Phase
 from .problem import Problem
 from .vector import CompiledVectorProblem, VectorProblem
@@ -22,7 +22,6 @@ __all__ = [
     "VectorProblem",
     "describe",
     "external",
-    "fmu",
     "is_catalogued",
     "load",
     "names",

@@ -50,7 +50,15 @@ class ModelVariable:
 
 
 class Fmu:
-    """A model-exchange FMU: what it has, and how it comes to a phase. Made by `problems.fmu`.
+    """A model of another tool, exported as an FMU for model exchange (FMI 2.0 or 3.0); `declare` brings it to a phase.
+
+    Its binary is run, with the rights of the user. It is unzipped into a temporary folder, which goes with the process; other processes
+    unzip it themselves. Derivatives are its own directional ones, where it has them and they agree with differences; else differences.
+
+    Parameters
+    ----------
+    path : str or path
+        The file, or the folder that it was unzipped into.
 
     Attributes
     ----------
@@ -59,6 +67,11 @@ class Fmu:
         Of the file.
     variables : dict of ModelVariable
         By name. `print` shows them as a table.
+
+    Raises
+    ------
+    ValueError
+        For what is no FMU, one for co-simulation only, or one without a binary for this machine.
 
     Examples
     --------
@@ -172,39 +185,7 @@ class Fmu:
         if model is None:
             raise ValueError(f"{self.name} is for co-simulation only: it has no rates. Export it for model exchange")
         if int(root.get("numberOfEventIndicators") or 0) or root.find("ModelStructure/EventIndicator") is not None:
-            warnings.warn(f"{self.name} has events: its rates are those between them, and what an event changes is left out", stacklevel=4)
-
-
-def fmu(path: str | os.PathLike[str]) -> Fmu:
-    """A model of another tool, exported as an FMU for model exchange (FMI 2.0 or 3.0): `Fmu.declare` brings it to a phase.
-
-    Its binary is run, with the rights of the user. It is unzipped into a temporary folder, which goes with the process; other processes
-    unzip it themselves. Derivatives are its own directional ones, where it has them and they agree with differences; else differences.
-
-    Parameters
-    ----------
-    path : str or path
-        The file, or the folder that it was unzipped into.
-
-    Returns
-    -------
-    Fmu
-        `print` shows what it has.
-
-    Raises
-    ------
-    ValueError
-        For what is no FMU, one for co-simulation only, or one without a binary for this machine.
-
-    Examples
-    --------
-    >>> from problems import fmu
-    >>> fmu("nowhere.fmu")
-    Traceback (most recent call last):
-    ...
-    ValueError: nowhere.fmu is no FMU that can be read: there is no file nowhere.fmu
-    """
-    return Fmu(path)
+            warnings.warn(f"{self.name} has events: its rates are those between them, and what an event changes is left out", stacklevel=3)
 
 
 def _stamp(path: Path) -> int:

@@ -216,7 +216,6 @@ class Counts:
 
     evaluations: int = 0
     inner_iterations: int = 0
-    gradient_solves: int = 0
     fallbacks: int = 0  # number of candidates that the fast inner level passed to the slow one
     failures: Counter[str] = field(default_factory=Counter)  # number of evaluations and gradient solves that did not converge, by status
     clocked: int = 0  # number of batches and solves that a time limit ended early
@@ -230,15 +229,19 @@ class Counts:
     solves_for: Counter[str] = field(default_factory=Counter)
     iterations_for: Counter[str] = field(default_factory=Counter)
     kept_for: Counter[str] = field(default_factory=Counter)
-    from_cache: int = field(default=0)  # evaluations whose values a cache of rows had
+    from_cache: int = 0  # evaluations whose values a cache of rows had
     first_failure: str = ""  # of an evaluation of a vector problem: the error, and the design
 
     __repr__ = short_repr
 
+    @property
+    def gradient_solves(self) -> int:
+        """Number of gradient solves."""
+        return sum(self.solves_for.values())
+
     def add_solves(self, count: int, status: Sequence[str], iterations: int, clocked: int, variables: int) -> None:
         """Count gradient solves with their statuses and iterations, of programs with so many variables; `clocked` of them were ended early
         by a time limit."""
-        self.gradient_solves += count
         self.solves_for += Counter({PURPOSE.get(): count})
         self.iterations_for += Counter({PURPOSE.get(): iterations})
         self.failures.update(one for one in status if one != CONVERGED)

@@ -134,7 +134,7 @@ def _version(package: str) -> str:
 
 
 COUNTED = ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "work", "gradient_work")
-"""Fields of `Counts` that are entries of `stats`."""
+"""What `Counts` has that are entries of `stats`."""
 COUNTED_BY = ("solves_for", "iterations_for", "kept_for")  # the same, by what gradient solves were for
 
 

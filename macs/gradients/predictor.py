@@ -1,7 +1,7 @@
 """Where solves between the points of a front begin: vectors and multipliers, predicted from the points around a place on it.
 
-Where a front is smooth, so are both along it, and a warm start from what is between the points around a place takes few iterations: 2 to 7
-where one from the nearest point takes 7 to 15. Between different valleys nothing lies: then each of these points is a start.
+Where a front is smooth, so are both along it, and a warm start from what is between the points around a place takes few iterations.
+Between different valleys nothing lies: then each of these points is a start.
 """
 
 from __future__ import annotations

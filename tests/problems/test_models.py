@@ -15,7 +15,7 @@ import pytest
 from test_externals import ascent
 
 from macs import optimize, sweep
-from problems import Problem, external, fmu
+from problems import Fmu, Problem, external
 from problems.layers import mapped
 from transcription import DFET
 
@@ -134,7 +134,7 @@ def sprint(model=None, **settings):
 @needs_a_compiler
 @pytest.mark.parametrize("version", [2, 3])
 def test_the_front_with_an_fmu_is_that_of_the_same_rates_in_casadi(version, tmp_path):
-    model = fmu(write_fmu(tmp_path, version))
+    model = Fmu(write_fmu(tmp_path, version))
     assert model.variables["x"].unit == "m" and model.variables["x"].bounds == (0.0, 5.0)
     assert "parameter  drag" in str(model) and "fixed" in str(model)
     known, found = (sweep(one, DFET(3, 4), points=3, starts=1) for one in (sprint(), sprint(model)))
@@ -148,7 +148,7 @@ def test_parameters_of_an_fmu_take_numbers_and_tunable_ones_expressions_with_der
     problem = Problem("push")
     run = problem.phase("run", t0=0.0, tf=1.0)
     a = problem.parameter("push", bounds=(0.5, 2.0))
-    fmu(write_fmu(tmp_path, 3)).declare(run, bounds={"cart.v": (0, 3)}, values={"a": 2.0 * a, "drag": 0.5})
+    Fmu(write_fmu(tmp_path, 3)).declare(run, bounds={"cart.v": (0, 3)}, values={"a": 2.0 * a, "drag": 0.5})
     problem.minimize("end", run.final(run["x"]))
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)  # as where derivatives are not those by differences
@@ -162,7 +162,7 @@ def test_parameters_of_an_fmu_take_numbers_and_tunable_ones_expressions_with_der
 @needs_a_compiler
 def test_wrong_derivatives_of_an_fmu_are_noticed_and_failures_are_no_numbers(tmp_path):
     with pytest.warns(UserWarning, match="the derivative of 'cart.v' by 'cart.v' is .* as given, and -.* by differences, which"):
-        compiled = sprint(fmu(write_fmu(tmp_path, 2, sign="-"))).compile()
+        compiled = sprint(Fmu(write_fmu(tmp_path, 2, sign="-"))).compile()
     known = sprint().compile()
     X = np.random.default_rng(0).random((2, 3))
     inputs = X, X[:1], 0.0, np.array([0.0, 1.0])
@@ -186,7 +186,7 @@ def test_wrong_derivatives_of_an_fmu_are_noticed_and_failures_are_no_numbers(tmp
 def test_what_an_fmu_does_not_have_is_said_by_its_names(settings, given, message, tmp_path):
     phase = Problem("p").phase("run", t0=0.0, tf=1.0)
     with pytest.raises(ValueError, match=message):
-        fmu(write_fmu(tmp_path, 2, **settings)).declare(phase, **given)
+        Fmu(write_fmu(tmp_path, 2, **settings)).declare(phase, **given)
 
 
 def library(folder, kind):
@@ -244,7 +244,7 @@ def test_what_a_library_does_not_have_is_said_by_the_users_names(tmp_path):
 def test_both_go_to_other_processes_which_leave_no_folder_behind(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        both = [sprint(fmu(write_fmu(tmp_path, 3))).compile(), ascent(library(tmp_path, "jacobian")).compile()]
+        both = [sprint(Fmu(write_fmu(tmp_path, 3))).compile(), ascent(library(tmp_path, "jacobian")).compile()]
     text = "import pickle, sys; print(*[p.phases[0].dynamics(0.5, 0.5, 0, [0, 1]) for p in pickle.load(sys.stdin.buffer)])"
     (tmp_path / "empty").mkdir()
     environment = os.environ | {"TMPDIR": str(tmp_path / "empty")}
@@ -256,7 +256,7 @@ def test_both_go_to_other_processes_which_leave_no_folder_behind(tmp_path):
 @needs_a_compiler
 @pytest.mark.slow
 def test_an_fmu_gives_the_same_with_workers(tmp_path):
-    problem = sprint(fmu(write_fmu(tmp_path, 2)))
+    problem = sprint(Fmu(write_fmu(tmp_path, 2)))
     alone, together = (sweep(problem, DFET(3, 4), points=3, starts=2, workers=workers) for workers in (1, 2))
     assert np.array_equal(alone.objectives, together.objectives)
     assert optimize(problem, DFET(3, 4), starts=1).simulate().max_defect < 1e-6
