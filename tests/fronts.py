@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from runs.measures.indicators import CURVE_SAMPLES, _along, _to_segments, normalised
+from macs.fronts.curve import distances
+from runs.measures.indicators import CURVE_SAMPLES, _along, normalised
 
 __all__ = ["distance_to_curve", "inverted_distance", "mean_distance"]
 
@@ -10,7 +11,7 @@ __all__ = ["distance_to_curve", "inverted_distance", "mean_distance"]
 def distance_to_curve(F: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Distance of each point (n, 2) to the polygon through the reference (k, 2), in the order given, in units of its range."""
     points, curve = normalised(F, reference)
-    return _to_segments(points, curve[:-1], np.diff(curve, axis=0))
+    return distances(points, [curve])
 
 
 def inverted_distance(F: np.ndarray, reference: np.ndarray) -> float:

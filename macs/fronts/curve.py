@@ -132,16 +132,12 @@ class FrontCurve:
 
     def distances(self, objectives: np.ndarray) -> np.ndarray:
         """Distances (n,) of points from the curve, in its ranges; objectives (n, 2) in the user's units and senses."""
-        points = np.column_stack(self.placed(np.asarray(objectives) * [goal.sign for goal in self.goals]))[:, None]
-        found = np.full(len(points), np.inf)
+        points = np.column_stack(self.placed(np.asarray(objectives) * [goal.sign for goal in self.goals]))
+        lines = []
         for part in self.parts:
             places = np.unique(np.concatenate([part.spread(2001), part.places]))
-            line = np.column_stack([places, part(places)[0]])
-            steps = np.diff(line, axis=0, append=line[-1:])
-            share = ((points - line) * steps).sum(axis=2) / np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
-            away = points - line - np.clip(share, 0.0, 1.0)[..., None] * steps
-            found = np.minimum(found, np.sqrt(2.0 * (away**2).sum(axis=2)).min(axis=1))
-        return found
+            lines.append(np.column_stack([places, part(places)[0]]))
+        return np.sqrt(2.0) * distances(points, lines)
 
     @cached_property
     def knee(self) -> np.ndarray:
@@ -195,6 +191,17 @@ class FrontCurve:
 def _scaled(places: np.ndarray, heights: np.ndarray) -> np.ndarray:
     """Objectives (..., 2) in ranges, of places and heights."""
     return np.stack([places + heights, 1.0 - places + heights], axis=-1)
+
+
+def distances(points: np.ndarray, lines: Sequence[np.ndarray]) -> np.ndarray:
+    """Distances (n,) of points (n, 2) to the nearest of some polygons (k, 2), in their order; one of them may be a point."""
+    found = np.full(len(points), np.inf)
+    for line in lines:
+        steps = np.diff(line, axis=0, append=line[-1:])
+        share = ((points[:, None] - line) * steps).sum(axis=2) / np.maximum((steps**2).sum(axis=1), np.finfo(float).tiny)
+        away = points[:, None] - line - np.clip(share, 0.0, 1.0)[..., None] * steps
+        found = np.minimum(found, np.linalg.norm(away, axis=2).min(axis=1))
+    return found
 
 
 def curve_of(front: Any) -> FrontCurve:

@@ -128,9 +128,9 @@ def measured_data(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
 def _reference_data(reference: Reference, goals: Sequence[Objective]) -> dict[str, Any]:
     """A reference as lines, where it is a curve, else as points; parts with a column for each objective."""
     signs = np.array([goal.sign for goal in goals])
-    F = truth(reference.front, goals)
-    lines = pieces(F)
-    return {"name": reference.what, "curves": bool(lines), "parts": [(part * signs).T.tolist() for part in (lines or [F])]}
+    lines = pieces(reference.front, goals)
+    parts = [(part * signs).T.tolist() for part in lines or [truth(reference.front, goals)]]
+    return {"name": reference.what, "curves": bool(lines), "parts": parts}
 
 
 def _attainment_data(comparison: Comparison) -> dict[str, Any] | None:

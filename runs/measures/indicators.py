@@ -4,15 +4,16 @@ Objectives are normalised by the range of the reference, 0 at its ideal and 1 at
 it for the caption of a table. Of a `Front`, the minimised objectives of its converged points are taken; an array next to one
 is in the user's units and senses, like `Front.objectives`. Of two arrays, all columns are minimised.
 
-Against a sparse reference, or one of three and more objectives, all five are as moocore and pymoo compute them. A dense reference of two
-objectives is the curve through its points, which those packages do not have: there `gd` is less than theirs, by up to half the spacing of
-the points, and `igd` and `igd_plus` weigh each piece of the curve by its length rather than by how many points lie on it."""
+A reference of two objectives is a curve where its points tell enough of it, see `pieces`; those packages have no curves. There `gd` is less
+than theirs, by up to half the spacing of the points, and `igd` and `igd_plus` weigh each piece of the curve by its length rather than by
+how many points lie on it. Against other references all five are as moocore and pymoo compute them."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeVar
 
 import moocore
@@ -20,6 +21,7 @@ import numpy as np
 
 from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
+from macs.fronts.curve import FrontCurve, distances
 from macs.io.text import counted, label
 from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
@@ -27,7 +29,10 @@ from problems.compiled import Objective
 VOLUME_CORNER = 1.1
 """Of the hypervolume in each objective, in ranges of the reference from its ideal: as published comparisons have it."""
 CURVE_SAMPLES = 2001
-"""Number of points, evenly along its length, that represent a dense reference of two objectives."""
+"""Number of points along a reference that is a curve, which stand for it."""
+
+CURVE_KNOWN = 0.02
+"""In ranges: estimated error of a curve up to which a reference is that, and spacing of points without rates up to which lines are one."""
 
 Points = Front | np.ndarray
 Measure = TypeVar("Measure", bound=Callable[..., float])
@@ -44,7 +49,7 @@ def _documented(measure: Measure) -> Measure:
             Whether objectives are divided by the ranges of the reference.
         """
     )
-    curve = "curve : bool\n    Whether a dense reference of two objectives is the curve through its points."
+    curve = "curve : bool\n    Whether a reference of two objectives is a curve where its points tell enough of it."
     imports = "Examples\n--------\n>>> import numpy as np\n>>> truth = np.array([[0.0, 1.0], [1.0, 0.0]])"
     text = inspect.cleandoc(measure.__doc__ or "")
     for mark, words in (("[parameters]", takes), ("[curve]", curve), ("[examples]", imports)):
@@ -57,8 +62,9 @@ def _documented(measure: Measure) -> Measure:
 def gd(front: Points, reference: Points, *, normalise: bool = True, curve: bool = True) -> float:
     """Generational distance: mean distance of the front's points from the reference. NaN for an empty front.
 
-    A reference of two objectives is the curve through its points, where they are dense: against points alone no front could be nearer than
-    about a quarter of their spacing. With `curve=False` it is its points alone, always, as most published tables have it.
+    A reference of two objectives is the curve through its points, where they have rates (see `Front.curve`) or are dense: against points
+    alone no front could be nearer than about a quarter of their spacing. With `curve=False` it is its points alone, always, as most
+    published tables have it.
 
     [parameters]
     [curve]
@@ -68,8 +74,8 @@ def gd(front: Points, reference: Points, *, normalise: bool = True, curve: bool 
     >>> round(gd(np.array([[0.1, 1.0]]), truth), 3)
     0.1
     """
-    F, R = _pair(front, reference, normalise)
-    return float(_to_reference(F, R, curve).mean()) if len(F) else np.nan
+    F, R, lines = _pair(front, reference, normalise, curve)
+    return float((distances(F, lines) if lines else np.linalg.norm(F[:, None] - R, axis=2).min(axis=1)).mean()) if len(F) else np.nan
 
 
 @_documented
@@ -86,8 +92,8 @@ def igd(front: Points, reference: Points, *, normalise: bool = True, curve: bool
     >>> round(igd(truth, truth), 3)
     0.0
     """
-    F, R = _pair(front, reference, normalise)
-    return float(moocore.igd(F, ref=_evenly(R, curve))) if len(F) else np.inf
+    F, R, lines = _pair(front, reference, normalise, curve)
+    return float(moocore.igd(F, ref=_evenly(lines) if lines else R)) if len(F) else np.inf
 
 
 @_documented
@@ -102,8 +108,8 @@ def igd_plus(front: Points, reference: Points, *, normalise: bool = True, curve:
     >>> round(igd_plus(truth, truth), 3)
     0.0
     """
-    F, R = _pair(front, reference, normalise)
-    return float(moocore.igd_plus(F, ref=_evenly(R, curve))) if len(F) else np.inf
+    F, R, lines = _pair(front, reference, normalise, curve)
+    return float(moocore.igd_plus(F, ref=_evenly(lines) if lines else R)) if len(F) else np.inf
 
 
 @_documented
@@ -117,7 +123,7 @@ def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True
     >>> round(additive_epsilon(truth + 0.1, truth), 3)
     0.1
     """
-    F, R = _pair(front, reference, normalise)
+    F, R, _ = _pair(front, reference, normalise, curve=False)
     return float(moocore.epsilon_additive(F, ref=R)) if len(F) else np.inf
 
 
@@ -137,7 +143,7 @@ def hypervolume(front: Points, reference: Points, *, point: float = VOLUME_CORNE
     >>> round(hypervolume(truth, truth), 3)
     0.21
     """
-    F, R = _pair(front, reference, normalise)
+    F, R, _ = _pair(front, reference, normalise, curve=False)
     if not len(F):
         return 0.0
     ideal, unit = extent(R)
@@ -204,41 +210,50 @@ def truth(reference: Points, goals: Sequence[Objective] | None = None) -> np.nda
     return R[np.lexsort(R.T[::-1])]
 
 
-def _pair(front: Points, reference: Points, normalise: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Minimised objectives of both, (n, m) and (k, m)."""
+def _pair(front: Points, reference: Points, normalise: bool, curve: bool) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Minimised objectives of both, (n, m) and (k, m), and the lines that the reference is as a curve, if wanted."""
     goals = goals_of((front, reference))
     F, R = minimised(front, goals), truth(reference, goals)
     if len(F) and F.shape[1] != R.shape[1]:
         raise ValueError(f"the front has {F.shape[1]} objectives, the reference {R.shape[1]}")
-    return normalised(F, R) if normalise and len(F) else (F, R)
+    lines = pieces(reference, goals) if curve else []
+    if normalise and len(F):
+        return normalised(F, R)[0], normalised(R, R)[0], [normalised(line, R)[0] for line in lines]
+    return F, R, lines
 
 
-def pieces(R: np.ndarray) -> list[np.ndarray]:
-    """The curves of a reference in its order; none where its points are not dense, or not of two objectives."""
+def pieces(reference: Points, goals: Sequence[Objective] | None = None) -> list[np.ndarray]:
+    """The lines (k, 2), minimised, that a reference of two objectives is: along its curve, where that is known from rates, or from point to
+    point, where these are dense. None if neither is so."""
+    R = truth(reference, goals)
     if R.shape[1] != 2:
         return []
+    if isinstance(reference, Front) and (known := _known(reference)):
+        rows = known.sample(CURVE_SAMPLES) * reference.signs
+        return [part[~np.isnan(part[:, 0])] for part in np.split(rows, np.flatnonzero(np.isnan(rows[:, 0])))]
     gaps = np.linalg.norm(np.diff(normalised(R, R)[0], axis=0), axis=1)
-    parts = np.split(R, np.flatnonzero(gaps > 0.02) + 1)  # nearer neighbours, in ranges, are points of one curve
+    parts = np.split(R, np.flatnonzero(gaps > CURVE_KNOWN) + 1)
     return parts if all(len(part) > 1 for part in parts) else []
 
 
-def _to_reference(F: np.ndarray, R: np.ndarray, curve: bool) -> np.ndarray:
-    """Distance (n,) of points to a reference."""
-    curves = pieces(R) if curve else []
-    if not curves:
-        return np.linalg.norm(F[:, None] - R, axis=2).min(axis=1)
-    start, step = (np.vstack([part(piece) for piece in curves]) for part in (lambda c: c[:-1], lambda c: np.diff(c, axis=0)))
-    return _to_segments(F, start, step)
+@lru_cache(maxsize=16)
+def _known(reference: Front) -> FrontCurve | None:
+    """The curve of a reference; None if it errs by too much, or a point is off its pieces, or better by more than it errs."""
+    try:
+        curve = reference.curve()
+    except ValueError:
+        return None
+    F = truth(reference)
+    places, heights = curve.placed(F)
+    doubtful = F[~(curve.at(places)[0] - heights <= curve.error)]
+    return curve if curve.error <= CURVE_KNOWN and (curve.distances(doubtful * reference.signs) <= curve.error).all() else None
 
 
-def _evenly(R: np.ndarray, curve: bool) -> np.ndarray:
-    """The points of a reference, or where it is dense points evenly along it."""
-    curves = pieces(R) if curve else []
-    if not curves:
-        return R
-    lengths = np.array([np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() for piece in curves])
+def _evenly(lines: Sequence[np.ndarray]) -> np.ndarray:
+    """Points evenly along some polygons."""
+    lengths = np.array([np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines])
     counts = np.maximum(2, np.round(CURVE_SAMPLES * lengths / lengths.sum()).astype(int))
-    return np.vstack([_along(piece, count) for piece, count in zip(curves, counts, strict=True)])
+    return np.vstack([_along(line, count) for line, count in zip(lines, counts, strict=True)])
 
 
 def _along(curve: np.ndarray, samples: int) -> np.ndarray:
@@ -246,14 +261,6 @@ def _along(curve: np.ndarray, samples: int) -> np.ndarray:
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
     at = np.linspace(0.0, length[-1], samples)
     return np.column_stack([np.interp(at, length, column) for column in curve.T])
-
-
-def _to_segments(points: np.ndarray, start: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Distance (n,) of points to the nearest of some segments (k, 2)."""
-    squared = np.maximum((step**2).sum(axis=1), 1e-300)
-    share = ((points[:, None] - start) * step).sum(axis=2) / squared
-    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * step
-    return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1)
 
 
 @dataclass(frozen=True)
@@ -266,7 +273,7 @@ class Scale:
     goals: tuple[Objective, ...]
     what: str  # name of the reference: "the closed form", "the union of 60 runs"
     count: int  # how many points it has
-    curve: bool  # whether its points are taken as the curve through them
+    curve: str  # whether it is the curve through them, in words
 
     @classmethod
     def of(cls, reference: Front, *, what: str = "the reference", curve: bool = True) -> Scale:
@@ -275,14 +282,15 @@ class Scale:
         ideal, unit = extent(R)
         sign = np.array([goal.sign for goal in goals])
         best, worst, corner = (tuple((sign * values + 0.0).tolist()) for values in (ideal, R.max(axis=0), ideal + VOLUME_CORNER * unit))
-        return cls(best, worst, corner, goals, what, len(R), curve and bool(pieces(R)))
+        known = _known(reference) if len(goals) == 2 else None
+        words = f", the curve through them, known to about {known.error:.0e}" if known else ", the curve through them"
+        return cls(best, worst, corner, goals, what, len(R), words if curve and pieces(reference) else "")
 
     def describe(self) -> str:
         """Two sentences for a caption."""
-        how = ", the curve through them" if self.curve else ""
         ends = f"0 at the ideal ({self._all(self.ideal)}) and 1 at the nadir ({self._all(self.nadir)})"
         volume = f"Hypervolume up to {VOLUME_CORNER:g} in each objective ({self._all(self.corner)})."
-        return f"Objectives normalised to {ends} of {self.what} ({counted(self.count, 'point')}{how}). {volume}"
+        return f"Objectives normalised to {ends} of {self.what} ({counted(self.count, 'point')}{self.curve}). {volume}"
 
     def _all(self, values: tuple[float, ...]) -> str:
         return ", ".join(f"{goal.name} {value:.6g} {goal.unit}".rstrip() for goal, value in zip(self.goals, values, strict=True))

@@ -20,7 +20,7 @@ from macs.fronts.point import Point
 from macs.io.text import label
 from macs.pareto.spread import spread
 
-from ..measures.indicators import normalised, pieces, truth
+from ..measures.indicators import normalised, pieces
 from ..measures.references import module_of
 from .comparison import Comparison
 from .plots import PAGE, front_figure, new_figure, style
@@ -72,8 +72,8 @@ class Flights:
     def table(self) -> Table:
         """Their objectives; with two of them, the best of the second that is known for the first."""
         goals = self.comparison.known.goals
-        R = truth(self.comparison.against.front)
-        curve = R if len(pieces(R)) == 1 else None  # the reference, minimised, where it is one curve of two objectives
+        lines = pieces(self.comparison.against.front)
+        curve = lines[0] if len(lines) == 1 else None
         heads: list[Head | str] = ["solution", *(Head(label(goal.name, goal.unit), digits=7) for goal in goals)]
         if curve is not None:
             heads += [Head(label(f"{goals[1].name} of {self._truth}", goals[1].unit), digits=7), "short of it, of the range"]

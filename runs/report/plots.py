@@ -68,7 +68,7 @@ def front_figure(
     marked: Points | None = None,
     truth_name: str = "truth",
 ) -> Figure:
-    """All points of all runs: one colour and marker a solver, the truth as a line where it is dense."""
+    """All points of all runs: one colour and marker a solver, the truth as a line where it is a curve."""
     m, signs = len(goals), np.array([goal.sign for goal in goals])
     pairs = list(combinations(range(m), 2))
     columns = min(3, len(pairs))
@@ -80,7 +80,7 @@ def front_figure(
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
         for ax, (i, j) in zip(grid, pairs, strict=False):
             if reference is not None:
-                _draw_truth(ax, truth(reference, goals), signs, (i, j), truth_name)
+                _draw_truth(ax, reference, goals, (i, j), truth_name)
             for k, (solver, runs) in enumerate(fronts.items()):
                 if not runs:  # none is finished; other solvers keep their colours of all figures
                     continue
@@ -121,7 +121,7 @@ def attainment_figure(
         grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
         for k, (ax, (solver, surface)) in enumerate(zip(grid, surfaces.items(), strict=False)):
             if reference is not None:
-                _draw_truth(ax, truth(reference, goals), signs, (0, 1), truth_name)
+                _draw_truth(ax, reference, goals, (0, 1), truth_name)
             _draw_surfaces(ax, surface, ends, COLORS[k % len(COLORS)])
             ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
             ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
@@ -187,13 +187,13 @@ def _runs(solver: str, runs: int, empty: int) -> str:
     return f"{solver}, {counted(runs, 'run')}{f' ({empty} empty)' if empty else ''}"
 
 
-def _draw_truth(ax: Any, R: np.ndarray, signs: np.ndarray, pair: tuple[int, int], name: str) -> None:
-    """A line for each piece of a dense reference of two objectives, minimised, else small points; beneath all else."""
-    curves = pieces(R)
+def _draw_truth(ax: Any, reference: Points, goals: Sequence[Objective], pair: tuple[int, int], name: str) -> None:
+    """A line for each piece of a reference that is a curve, else small points; beneath all else."""
+    curves, signs = pieces(reference, goals), np.array([goal.sign for goal in goals])
     for k, curve in enumerate(curves):
         ax.plot(*(curve * signs).T, color="black", lw=0.9, zorder=2, label=name if k == 0 else None)
     if not curves:
-        ax.plot(*(R * signs)[:, pair].T, ".", color=GREY, ms=2.0, zorder=1, label=name)
+        ax.plot(*(truth(reference, goals) * signs)[:, pair].T, ".", color=GREY, ms=2.0, zorder=1, label=name)
 
 
 def _mark(ax: Any, places: np.ndarray, signs: np.ndarray) -> None:

@@ -10,11 +10,13 @@ from pymoo.problems import get_problem
 
 import runs
 from macs import Front
+from macs.evaluation.evaluator import CONVERGED
 from problems.cases import goddard
 from problems.compiled import Objective
 from runs import additive_epsilon, gd, hypervolume, igd, igd_plus
 from runs.measures.indicators import Scale, hypervolume_at
 from runs.measures.references import foreign
+from transcription.trajectories.costates import Costates
 
 LINE = np.column_stack([np.linspace(0, 1, 101), np.linspace(1, 0, 101)])
 CORNERS = np.array([[0.0, 1.0], [1.0, 0.0]])
@@ -97,6 +99,35 @@ def test_a_dense_reference_is_a_curve_in_pieces_by_their_lengths_unless_curve_is
     for indicator, unit in ((igd, np.sqrt(2)), (igd_plus, 1.0)):
         assert indicator(end, uneven) == pytest.approx(0.5 * unit, rel=1e-3)
         assert indicator(end, uneven, curve=False) == pytest.approx(share.mean() * unit)
+
+
+def test_a_sparse_reference_with_rates_is_its_curve_unless_a_point_of_it_lies_before_that():
+    """An arc of a circle about (1, 1), of which the second objective is maximised, and the arc 0.1 outside of it."""
+    goals = (Objective("cost", "kg"), Objective("gain", "", "maximize"))
+
+    def arc(radius, count):
+        angles = np.radians(np.linspace(10.0, 80.0, count))
+        directions = np.column_stack([np.cos(angles), np.sin(angles)])
+        return 1.0 - radius * directions, [Costates(one / one.sum(), {}) for one in directions]
+
+    def reference(F, costates):
+        blank = {"decision": np.zeros((len(F), 0)), "violation": np.zeros(len(F)), "status": [CONVERGED] * len(F)}
+        return Front(F=F, goals=goals, costates=costates, **blank)
+
+    F, costates = arc(1.0, 5)
+    five = reference(F, costates)
+    outside = arc(0.9, 50)[0] * [1, -1]
+    assert gd(outside, five, normalise=False) == pytest.approx(0.1, abs=1e-4) and gd(outside, five, curve=False, normalise=False) > 0.11
+    assert gd(five, five) < 1e-6
+    # From its middle: the mean chord of half of the arc.
+    half = np.radians(35.0)
+    assert igd(five[2:3], five, normalise=False) == pytest.approx(8 / half * np.sin(half / 4) ** 2, abs=1e-3)
+    words = Scale.of(five).describe()
+    assert "(5 points, the curve through them, known to about 2e-03)" in words and "known" not in Scale.of(five, curve=False).describe()
+    behind, before = (np.vstack([F, [arc(radius, 8)[0][3]]]) for radius in (0.98, 1.02))
+    assert gd(five, reference(behind, [*costates, None])) < 1e-6
+    assert "curve" not in Scale.of(reference(before, [*costates, None])).describe()
+    assert "curve" not in Scale.of(reference(F, [*costates[:2], None, None, None])).describe(), "its pieces are not all of it"
 
 
 def test_volumes_and_distances_in_closed_form():
