@@ -31,9 +31,6 @@ VOLUME_CORNER = 1.1
 CURVE_SAMPLES = 2001
 """Number of points along a reference that is a curve, which stand for it."""
 
-CURVE_KNOWN = 0.02
-"""In ranges: estimated error of a curve up to which a reference is that, and spacing of points without rates up to which lines are one."""
-
 Points = Front | np.ndarray
 Measure = TypeVar("Measure", bound=Callable[..., float])
 
@@ -232,7 +229,7 @@ def pieces(reference: Points, goals: Sequence[Objective] | None = None) -> list[
         rows = known.sample(CURVE_SAMPLES) * reference.signs
         return [part[~np.isnan(part[:, 0])] for part in np.split(rows, np.flatnonzero(np.isnan(rows[:, 0])))]
     gaps = np.linalg.norm(np.diff(normalised(R, R)[0], axis=0), axis=1)
-    parts = np.split(R, np.flatnonzero(gaps > CURVE_KNOWN) + 1)
+    parts = np.split(R, np.flatnonzero(gaps > 0.02) + 1)  # nearer neighbours, in ranges, are points of one curve
     return parts if all(len(part) > 1 for part in parts) else []
 
 
@@ -246,7 +243,8 @@ def _known(reference: Front) -> FrontCurve | None:
     F = truth(reference)
     places, heights = curve.placed(F)
     doubtful = F[~(curve.at(places)[0] - heights <= curve.error)]
-    return curve if curve.error <= CURVE_KNOWN and (curve.distances(doubtful * reference.signs) <= curve.error).all() else None
+    known = len(curve.within().parts) == len(curve.parts) and (curve.distances(doubtful * reference.signs) <= curve.error).all()
+    return curve if known else None
 
 
 def _evenly(lines: Sequence[np.ndarray]) -> np.ndarray:
