@@ -7,6 +7,7 @@ the states are those of its authors' published implementation.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import atanh, cosh, sinh
 
 import casadi as ca
@@ -107,6 +108,11 @@ def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarra
         "vy": THRUST * k * (first - root) - GRAVITY * t,
         "u": np.arctan(z),
     }
+
+
+def track(states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Distance and height of a flight, of its states by name."""
+    return {f"{name} [km]": states[name] for name in ("x", "y")}
 
 
 def _speed(tf: float) -> float:

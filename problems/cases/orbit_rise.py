@@ -8,6 +8,7 @@ published implementation and belong to the problem: without them a coarse mesh h
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import casadi as ca
@@ -91,6 +92,16 @@ def optimal_flight(flight_time: float, points: int = 201) -> dict[str, np.ndarra
     found = root(missing, [np.interp(flight_time, table[:, 0], column) for column in table[:, 2:].T], tol=1e-11)
     r, vr, theta, vt, _, toward_vr, toward_vt = propagated(found.x)
     return {"time": times, "r": r, "vr": vr, "theta": theta, "vt": vt, "u": np.arctan2(toward_vt, toward_vr)}
+
+
+def track(states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Where a flight is in the plane of its orbit, of its states by name."""
+    return {"r cos theta [DU]": states["r"] * np.cos(states["theta"]), "r sin theta [DU]": states["r"] * np.sin(states["theta"])}
+
+
+def derived(states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The energy along a flight, of its states by name."""
+    return {"energy [DU²/TU²]": 0.5 * (states["vr"] ** 2 + states["vt"] ** 2) - 1.0 / states["r"]}
 
 
 def _with_costates(_: float, x: np.ndarray) -> list[float]:

@@ -74,6 +74,8 @@ def module_of(case: str) -> SimpleNamespace:
     - `reference() -> array (k, m)`: its true front, in the user's units and senses;
     - `optimal_flight(flight_time) -> {"time": ..., name: values (n,)}`: the best flight of a duration, and `LAW`, its name;
     - `plot(flights) -> {name: Figure}`: its own figures of objects with a `trajectory`;
+    - `track(states) -> {label: values (n,)}`: where it is in a plane, of values by name of state: two, horizontal and vertical;
+    - `derived(states) -> {label: values (n,)}`: what else to draw over time;
     - `dispersed(front, settings)`: what becomes of each point of a front under dispersions, `{way to fly: outcome}`, the nominal case
       first, where an outcome has `measures() -> {(name, unit): value}`; and `Dispersions`, the dataclass of the settings.
     """
@@ -197,6 +199,7 @@ class Reference:
     front: Front
     what: str  # in words: "the true front, in closed form"
     true: bool  # whether it is the truth, or only the best that is known
+    alone: bool = False  # whether it is but one run, or one point of several, so that nothing can be compared with it
 
 
 def look_up(given: Any, label: str, address: str, data: Mapping[str, Any], goals: Sequence[Objective]) -> Reference | None:

@@ -15,7 +15,7 @@ from macs.io.text import label
 from macs.preferences.pictures import draw_degrees
 
 from .comparison import Comparison
-from .flights import flights_figure
+from .flights import case_figures, flights_figure
 from .plots import COLUMN, PAGE, legend, new_figure, style
 from .tables import Cell, Head, Table, table
 
@@ -113,7 +113,9 @@ def choices_figures(comparison: Comparison) -> dict[str, Figure]:
             stem = solver if len(mine) <= SIDE_BY_SIDE else f"{solver}-{number}"
             found[f"degrees-{stem}"] = degrees_figure(part)
             if all(one.point.trajectory is not None for one in part):
-                found[f"flights-{stem}"] = flights_figure([one.point for one in part], names=[one.label for one in part])
+                points = [one.point for one in part]
+                found[f"flights-{stem}"] = flights_figure(points, names=[one.label for one in part])
+                found |= {f"{name}-{stem}": figure for name, figure in case_figures(points).items()}
     return found
 
 

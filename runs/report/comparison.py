@@ -146,7 +146,7 @@ class Comparison:
         fronts = counting if self.verifies else self.every
         together = union([front if front.source is not None else front.objectives for front in fronts])  # others have no trajectories
         assert isinstance(together, Front)  # as all of them are
-        return Reference(together, f"the union of {counted(len(fronts), 'run')}", False)
+        return Reference(together, f"the union of {counted(len(fronts), 'run')}", False, alone=len(fronts) == 1 or len(together) == 1)
 
     def reference(self, given: Any) -> Reference:
         """The reference that the study states for this problem; see `look_up`."""

@@ -23,13 +23,16 @@ from macs.pareto.spread import spread
 from ..measures.indicators import normalised, pieces
 from ..measures.references import module_of
 from .comparison import Comparison
-from .plots import PAGE, front_figure, new_figure, style
+from .plots import COLUMN, PAGE, front_figure, legend, new_figure, style
 from .tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from transcription.trajectories.trajectory import PhaseTrajectory
 
+Derived = Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
+"""What a case makes of values (n,) by name of state: values by the label of an axis."""
 Law = Mapping[str, np.ndarray]
 """A known optimal flight: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
 LAW_LOOK: Mapping[str, Any] = {"color": "black", "lw": 0.9, "ls": (0, (4, 2))}
@@ -59,9 +62,7 @@ class Flights:
         for solver in comparison.runs:
             front = comparison.merged(solver)
             if front is not None and front[0].trajectory is not None:
-                address = front.source.address if front.source is not None else ""
-                case = module_of(address) if address and not address.rpartition(":")[0].endswith(".py") else None
-                return cls(comparison, solver, front, case)
+                return cls(comparison, solver, front, _case_of(front[0]))
         return None
 
     @cached_property
@@ -89,7 +90,11 @@ class Flights:
         """{name of a file: figure}."""
         law: Callable[[float], Law] | None = getattr(self.case, "optimal_flight", None)
         laws = [law(float(point.trajectory.phases[-1].time[-1])) if law and point.trajectory else None for point in self.points]
-        found = {"flights": flights_figure(self.points, laws=laws, law_name=getattr(self.case, "LAW", "known law"), solver=self.solver)}
+        known = {"laws": laws, "law_name": getattr(self.case, "LAW", "known law")}
+        more = {"derived": self.case.derived} if hasattr(self.case, "derived") else {}
+        found = {"flights": flights_figure(self.points, **known, **more, solver=self.solver)}
+        if hasattr(self.case, "track"):
+            found["paths"] = paths_figure(self.points, self.case.track, **known)
         if len(self.comparison.known.goals) > 1:
             found["representatives"] = front_figure(
                 {self.solver: self.comparison.fronts[self.solver]},
@@ -98,11 +103,7 @@ class Flights:
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,
             )
-        plot = getattr(self.case, "plot", None)
-        if plot is not None:
-            with style():
-                found |= plot([self.front[i] for i in representatives(self.front, 100)])
-        return found
+        return found | case_figures([self.front[i] for i in representatives(self.front, 100)])
 
     @property
     def _truth(self) -> str:
@@ -117,6 +118,19 @@ def _beside(point: Point, curve: np.ndarray | None) -> list[Cell]:
     first, second = (sign * value for sign, value in zip(signs, point.objectives.values(), strict=True))
     known = float(np.interp(first, *curve.T))
     return [signs[1] * known, (second - known) / float(np.ptp(curve[:, 1]))]
+
+
+def _case_of(point: Point) -> SimpleNamespace | None:
+    """The module of a point's problem, if that is a case, see `references.module_of`."""
+    address = point.source.address if point.source is not None else ""
+    return module_of(address) if address and not address.rpartition(":")[0].endswith(".py") else None
+
+
+def case_figures(points: Sequence[Point]) -> dict[str, Figure]:
+    """{name of a file: figure} that the case of some points draws of them; none if it draws nothing."""
+    plot = getattr(_case_of(points[0]), "plot", None)
+    with style():
+        return {} if plot is None else plot(points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,26 +165,35 @@ class VariablesAlongFront:
 
 
 def flights_figure(
-    points: Sequence[Point], *, laws: Sequence[Law | None] = (), law_name: str = "", solver: str = "", names: Sequence[str] = ()
+    points: Sequence[Point],
+    *,
+    laws: Sequence[Law | None] = (),
+    law_name: str = "",
+    solver: str = "",
+    names: Sequence[str] = (),
+    derived: Derived = lambda _: {},
 ) -> Figure:
-    """A column for each point, a row for each state and control over time, with the optimal law of each as a dashed line where there is
-    one; the point's number, from 1, and its objectives above."""
+    """A column for each point, a row for each state, what is derived of them, and each control over time, with the optimal law of each as a
+    dashed line where there is one; the point's number, from 1, and its objectives above."""
     from matplotlib.lines import Line2D
     from matplotlib.ticker import MaxNLocator
 
     flights = [point.trajectory for point in points if point.trajectory is not None]
-    rows = [name for name, kind in quantities(flights[0]) if kind != "path"]
+    kinds, lines_of = dict(quantities(flights[0])), [[_lines(phase, derived) for phase in flight.phases] for flight in flights]
+    more = [name for name in lines_of[0][0] if name not in kinds]
+    rows = [*(name for name, kind in kinds.items() if kind == "state"), *more, *(name for name, kind in kinds.items() if kind == "control")]
     units = {v.name: v.unit for phase in flights[0].phases for v in (*phase.state_variables, *phase.control_variables)}
     with style():
         figure = new_figure(PAGE, 1.0 * len(rows) + 0.75)
         grid = figure.subplots(len(rows), len(points), squeeze=False, sharex="col", sharey="row")
-        for column, (point, flight, law) in enumerate(zip(points, flights, laws or [None] * len(points), strict=True)):
+        for column, (point, phases, law) in enumerate(zip(points, lines_of, laws or [None] * len(points), strict=True)):
+            known = None if law is None else {**law, **derived(law)}
             for ax, name in zip(grid[:, column], rows, strict=True):
-                for k, phase in enumerate(flight.phases):
-                    if name in phase.names:
-                        ax.plot(*along(phase, name), color=COLORS[k % len(COLORS)], lw=1.3)
-                if law is not None and name in law:
-                    ax.plot(law["time"], law[name], **LAW_LOOK, zorder=3)
+                for k, found in enumerate(phases):
+                    if name in found:
+                        ax.plot(*found[name], color=COLORS[k % len(COLORS)], lw=1.3)
+                if known is not None and name in known:
+                    ax.plot(known["time"], known[name], **LAW_LOOK, zorder=3)
                 ax.margins(x=0.0)
             title = _title(names[column] if names else f"point {column + 1}", point, min(round(75 / len(points)) + 10, 110 // len(points)))
             grid[0, column].set_title(title, loc="left", fontsize=6.5)
@@ -189,6 +212,34 @@ def flights_figure(
         if handles:
             figure.legend(handles=handles, loc="outside upper right", ncols=len(handles), frameon=False)
     return figure
+
+
+def paths_figure(points: Sequence[Point], track: Derived, *, laws: Sequence[Law | None] = (), law_name: str = "") -> Figure:
+    """The paths of points in a plane: the first of what `track` makes of their states over the second, by label; with the optimal law of
+    each as a dashed line where there is one."""
+    with style():
+        figure = new_figure(COLUMN, 2.6)
+        ax = figure.subplots()
+        for number, (point, color) in enumerate(zip(points, COLORS, strict=False), 1):
+            for phase in point.trajectory.phases if point.trajectory is not None else ():
+                labels, places = zip(*track({name: values for name, (_, values) in _lines(phase).items()}).items(), strict=True)
+                ax.plot(*places, color=color, lw=1.3, label=f"point {number}" if phase is point.trajectory.phases[0] else None)
+        for law in filter(None, laws):
+            ax.plot(*track(law).values(), **LAW_LOOK, zorder=3, label=law_name if law is laws[0] else None)
+        ax.set(xlabel=labels[0], ylabel=labels[1])
+        wide, high = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
+        if max(wide, high) < 3.0 * min(wide, high):  # where directions can be seen
+            ax.set_aspect("equal", adjustable="datalim")
+        legend(figure, ax)
+    return figure
+
+
+def _lines(phase: PhaseTrajectory, derived: Derived = lambda _: {}) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """{name: times and values} of states, controls and what is derived of states, along every element."""
+    found = {one.name: along(phase, one.name) for one in (*phase.state_variables, *phase.control_variables)}
+    times = found[phase.state_variables[0].name][0]
+    states = {one.name: found[one.name][1] for one in phase.state_variables}
+    return found | {name: (times, values) for name, values in derived(states).items()}
 
 
 def _title(name: str, point: Point, width: int) -> str:

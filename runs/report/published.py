@@ -6,22 +6,22 @@ A kind of table is a class: the keys that a study file states, and how its figur
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta
 
 from macs.baselines.population import PopulationSolver
-from macs.decisions import FuzzySatisfactory, Preference, Ranges, from_dict
+from macs.decisions import FuzzySatisfactory, Preference, Ranges, from_dict, trade_offs
+from macs.fronts.pictures.flight_plot import along
 from macs.io.text import counted
 from problems.compiled import Objective
 
-from ..execution.task import FinalStates
 from ..files import Number, Section, Text, check_known, checked, errors_begin_with, is_number
 from ..measures.indicators import Scale, hypervolume_at, normalised
 from ..measures.statistics import summarise
-from .choices import chosen
-from .comparison import Comparison, samples, spent
+from .choices import RunChoice, chosen
+from .comparison import Comparison, Counting, samples, spent
 from .tables import Cell, Head, Table, table
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from macs.solvers.solver import Solver
     from problems.compiled import CompiledProblem
     from problems.vector import CompiledVectorProblem
+    from transcription.trajectories.trajectory import Trajectory
 
 Figures = Mapping[str, Cell]
 """The figures of a row by key."""
@@ -65,8 +66,18 @@ class PublishedTable(Section, tag_field="of", kw_only=True):
 
     @property
     def columns(self) -> Mapping[str, Head] | None:
-        """{key of a figure: head of its column}; None where the keys are names of objectives."""
+        """{key of a figure: head of its column}; None where the keys are names of objectives, or in `heads`."""
         return None
+
+    @property
+    def heads(self) -> Mapping[str, Head]:
+        """{key: head of its column} of figures other than objectives, where there are no `columns`."""
+        return {}
+
+    @property
+    def named(self) -> list[str]:
+        """The keys of all figures of the paper, in the order of its rows."""
+        return list(dict.fromkeys(key for row in self.rows for key in figures_of(row)))
 
     def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
         """Rows of figures of a solver's runs; empty if it has none."""
@@ -173,67 +184,70 @@ class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):
             raise ValueError(f"point: {len(self.point)} numbers, but {len(problem.goals)} objectives: {names}")
 
 
+class Measure(Section):
+    """A figure of a flight: of one state, `factor` times its value or, where there is a target, its distance from that."""
+
+    name: Text
+    state: Text
+    # Of the whole flight, or at its beginning or end.
+    take: Literal["least", "greatest", "first", "last"] = "last"
+    at: Number | None = None  # the target
+    unit: Text = ""
+    factor: Number = 1.0
+
+    def of(self, found: Counting) -> np.ndarray:
+        """Its values (n,) on the n points of a run that count, at the end as simulated."""
+        if self.take == "last":
+            values = [one[self.state] for one in found.ends.values() if self.state in one][-1]
+        else:
+            flights = [point.trajectory for point in found.front if point.trajectory is not None]
+            values = np.array([TAKEN[self.take](_whole(flight, self.state)) for flight in flights])
+        return self.factor * (values if self.at is None else np.abs(values - self.at))
+
+
+TAKEN: Mapping[str, Callable[[np.ndarray], float]] = {"least": np.nanmin, "greatest": np.nanmax, "first": lambda values: values[0]}
+
+
+def _whole(flight: Trajectory, state: str) -> np.ndarray:
+    """A state along all phases of a flight that have it."""
+    return np.concatenate([along(phase, state)[1] for phase in flight.phases if state in phase.names])
+
+
 class Objectives(PublishedTable, tag="objectives"):
-    """Statistics of each objective over the points of all runs."""
+    """Those statistics that the paper has, over the points of all runs, of each objective and of measures of their flights."""
+
+    measures: tuple[Measure, ...] = ()
 
     statistic_head: ClassVar[str] = STATISTIC
     words: ClassVar[Collection[str] | None] = STATISTICS
 
+    @property
+    def heads(self) -> Mapping[str, Head]:
+        return {one.name: Head(one.name, one.unit, digits=4) for one in self.measures}
+
     def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
-        return _statistics(dict(zip(comparison.known.names, _objectives(comparison.fronts[solver]).T, strict=False)))
+        values = dict(zip(comparison.known.names, _objectives(comparison.fronts[solver]).T, strict=False))
+        runs = [one for one in comparison.counting.get(solver, ()) if len(one.front)]
+        values |= {one.name: np.concatenate([one.of(run) for run in runs]) for one in self.measures if runs}
+        kinds = [name for name in STATISTICS if values and name in {row[STATISTIC] for row in self.rows}]
+        return [{STATISTIC: name, **{key: float(STATISTICS[name](found)) for key, found in values.items()}} for name in kinds]
 
     def remark(self, comparison: Comparison) -> str:
         without = [solver for solver, fronts in comparison.fronts.items() if fronts and not any(map(len, fronts))]
         none = f" No run of {', '.join(without)} has a point that counts." if without else ""
         return f"over the points of all runs; deviation and variance with divisor n - 1.{none}"
 
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        if len(self.heads) < len(self.measures):
+            raise ValueError("measures: no two may have the same name")
+        for one in self.measures:
+            with errors_begin_with(f"measures: '{one.name}'"):
+                check_known("state", [one.state], {v.name: None for phase in problem.phases for v in phase.states})
+
 
 def _objectives(fronts: Sequence[Front]) -> np.ndarray:
     """Objectives (n, m) of the points of several fronts together; (0, 0) if there is none."""
     return np.vstack([front.objectives for front in fronts if len(front)] or [np.empty((0, 0))])
-
-
-def _statistics(columns: Mapping[str, np.ndarray]) -> list[Figures]:
-    """A row for each of `STATISTICS`, of samples by name; none if there are no samples."""
-    return [{STATISTIC: name, **{key: float(of(values)) for key, values in columns.items()}} for name, of in STATISTICS.items() if columns]
-
-
-class FinalTarget(Section):
-    """A state at the end of the flight, and its target: the figure is `factor` times the distance between them."""
-
-    name: Text
-    state: Text
-    at: Number
-    unit: Text = ""
-    factor: Number = 1.0
-
-    def final(self, states: FinalStates) -> np.ndarray:
-        """The state (n,) at the end of the last phase that has it."""
-        return [one[self.state] for one in states.values() if self.state in one][-1]
-
-
-class FinalErrors(Objectives, tag="ends", kw_only=True):
-    """Statistics, over the points of all runs, of the distance of final states from their targets."""
-
-    ends: Annotated[list[FinalTarget], Meta(min_length=1, description="a list of tables")]
-
-    @property
-    def columns(self) -> Mapping[str, Head]:
-        return {end.name: Head(end.name, end.unit, digits=4) for end in self.ends}
-
-    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
-        found = [one.ends for one in comparison.counting.get(solver, ()) if len(one.front)]
-        if not found:
-            return []
-        away = [np.abs(np.concatenate([end.final(states) for states in found]) - end.at) for end in self.ends]
-        return _statistics({end.name: end.factor * distance for end, distance in zip(self.ends, away, strict=True)})
-
-    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
-        if len(self.columns) < len(self.ends):
-            raise ValueError("ends: no two may have the same name")
-        for end in self.ends:
-            with errors_begin_with(f"ends: '{end.name}'"):
-                check_known("state", [end.state], {v.name: None for phase in problem.phases for v in phase.states})
 
 
 class Feasibility(PublishedTable, tag="feasibility"):
@@ -315,7 +329,7 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
 
     @property
     def columns(self) -> Mapping[str, Head]:
-        found = {name: Head(name, "degree", digits=4) for name in self._names}
+        found = {name: Head(name, "degree", digits=4) for name in self.named}
         more = ["kappa", *map(EQ_53.format, self.regulating)] if self.regulating else []
         return found | {key: Head(key, digits=4) for key in more}
 
@@ -329,9 +343,9 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
         return rows
 
     def completed(self, row: Figures) -> Figures:
-        found, degrees = dict(row), np.array([[row.get(name) for name in self._names]], dtype=float)
-        goals = [Objective(name, "", "maximize") for name in self._names]
-        ranges = Ranges(dict.fromkeys(self._names, 1.0), dict.fromkeys(self._names, 0.0))
+        found, degrees = dict(row), np.array([[row.get(name) for name in self.named]], dtype=float)
+        goals = [Objective(name, "", "maximize") for name in self.named]
+        ranges = Ranges(dict.fromkeys(self.named, 1.0), dict.fromkeys(self.named, 0.0))
         for key, goal in self._weighed.items() if np.isfinite(degrees).all() else ():
             found["kappa"] = float(goal.kappa(goals, ranges, degrees)[0])
             found[key] = float(goal.stages(goals, ranges)[0].numbers(degrees)[0])
@@ -343,7 +357,7 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
 
     def optima(self) -> list[str]:
         """For each lambda, the least value of eq. (53) over the paper's rows and the ends of its front."""
-        known: dict[str, Figures] = {f"best {name}": {one: float(one == name) for one in self._names} for name in self._names}
+        known: dict[str, Figures] = {f"best {name}": {one: float(one == name) for one in self.named} for name in self.named}
         known |= {row[STATISTIC]: row for row in self.rows}
         figures = {name: self.completed(row) for name, row in known.items()}
         found = []
@@ -354,7 +368,7 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         names = [goal.name for goal in problem.goals]
-        check_known("objective", self._names, names)
+        check_known("objective", self.named, names)
         if self.preference is not None:
             with errors_begin_with("by"):
                 none = dict.fromkeys(names, 0.0)
@@ -366,14 +380,9 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
         return None if self.by is None else from_dict(self.by)
 
     @property
-    def _names(self) -> list[str]:
-        """Names of the objectives."""
-        return list(dict.fromkeys(key for row in self.rows for key in figures_of(row)))
-
-    @property
     def _weighed(self) -> dict[str, FuzzySatisfactory]:
         """What minimises eq. (53), for each lambda, by the key of its values."""
-        return {EQ_53.format(weight): FuzzySatisfactory({}, self._names, regulating=weight) for weight in self.regulating}
+        return {EQ_53.format(weight): FuzzySatisfactory({}, self.named, regulating=weight) for weight in self.regulating}
 
     def __post_init__(self) -> None:
         if self.by is not None:
@@ -382,6 +391,45 @@ class Degrees(PublishedTable, tag="degrees", kw_only=True):
         super().__post_init__()
         with errors_begin_with("regulating"):
             _ = self._weighed
+
+
+class TradeOffTable(PublishedTable, tag="trade-offs", kw_only=True):
+    """What all objectives change by where one gets better fastest, for one choice, in ranges of the choice: positive is better, too. The
+    `statistic` of a row is the objective that gets better by 1."""
+
+    choice: Text  # its label
+
+    statistic_head: ClassVar[str] = "better"
+    words: ClassVar[Collection[str] | None] = ()
+
+    @property
+    def columns(self) -> Mapping[str, Head]:
+        return {name: Head(name) for name in self.named}
+
+    def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
+        found = [one for one in chosen(comparison) if one.solver == solver and one.label == self.choice]
+        return [row for one in found for row in self._rows(one)]
+
+    def _rows(self, one: RunChoice) -> list[Figures]:
+        goals, ranges = one.point.goals, one.ranges
+        spans = np.array([ranges.worst[goal.name] - ranges.best[goal.name] for goal in goals])
+        matrix = trade_offs(one.point).matrix * spans[:, None] / spans
+        return [
+            {STATISTIC: goal.name, **{by.name: float(x) for by, x in zip(goals, row, strict=True)}}
+            for goal, row in zip(goals, matrix, strict=True)
+        ]
+
+    def remark(self, comparison: Comparison) -> str:
+        said = [
+            f" {message[0].upper()}{message[1:]}."
+            for one in chosen(comparison)
+            if one.label == self.choice
+            for message in trade_offs(one.point).messages
+        ]
+        return f"of the choice '{self.choice}', in the ranges by which objectives were normalised.{''.join(said)}"
+
+    def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
+        check_known("objective", self.named, [goal.name for goal in problem.goals])
 
 
 class DominatedDesigns(PublishedTable, tag="designs"):
@@ -422,7 +470,7 @@ class DominatedDesigns(PublishedTable, tag="designs"):
                 raise ValueError(f"the design '{row['by']}' has no {', '.join(missing)} other than 0: gains are shares of all figures")
 
 
-KINDS = Indicators | Hypervolume | Objectives | FinalErrors | Feasibility | PayoffTable | Degrees | DominatedDesigns
+KINDS = Indicators | Hypervolume | Objectives | Feasibility | PayoffTable | Degrees | TradeOffTable | DominatedDesigns
 
 
 def papers(given: Any) -> list[PublishedTable]:
@@ -452,7 +500,7 @@ def check_against(given: Any, problems: Mapping[str, CompiledProblem | CompiledV
                 with errors_begin_with(f"row {place}"):
                     check_known("problem", [row["problem"]], problems)
                     if paper.columns is None:
-                        check_known("objective", figures_of(row), [goal.name for goal in problems[row["problem"]].goals])
+                        check_known("objective", figures_of(row), [*(goal.name for goal in problems[row["problem"]].goals), *paper.heads])
             for label in dict.fromkeys(row["problem"] for row in paper.rows):
                 with errors_begin_with(f"problem '{label}'"):
                     paper.check_problem(problems[label])
@@ -469,7 +517,7 @@ def published_tables(comparisons: Sequence[Comparison], study: Mapping[str, Any]
 def _beside(comparisons: Sequence[Comparison], paper: PublishedTable, study: Mapping[str, Any]) -> Table | None:
     """One published table and ours; None if there are no runs of its problems."""
     columns = paper.columns
-    keys = [*(columns or dict.fromkeys(key for row in paper.rows for key in figures_of(row))), *paper.further]
+    keys = [*(columns or dict.fromkeys([*paper.named, *paper.heads])), *paper.further]
     timed = "seconds" in keys
     rows: list[list[Cell]] = []
     notes: list[str] = []
@@ -504,7 +552,7 @@ def _beside(comparisons: Sequence[Comparison], paper: PublishedTable, study: Map
     heads: list[Head | str] = [Head("problem", grouped=True), *(Head(name, grouped=bool(paper.statistic_head)) for name in ("by", "runs"))]
     heads += [paper.statistic_head] if paper.statistic_head else []
     units = {goal.name: goal.unit for comparison in comparisons for goal in comparison.known.goals}
-    known = {**(columns or {}), **paper.further}
+    known = {**(columns or paper.heads), **paper.further}
     heads += [known.get(key) or Head(key, units.get(key, ""), digits=4) for key in keys]
     heads += [Head("the paper's time / ours", digits=2)] if timed else []
     caption = f"Beside {paper.source}" if paper.source else "Beside published figures"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 import numpy as np
@@ -43,7 +43,7 @@ TABLES: Sequence[Callable[[Comparison, Mapping[str, Any]], dict[str, Table]]] = 
 )
 """The tables of each comparison: (comparison, definition of the study) -> {name of a file: table}. A new table is one more here."""
 OF_FRONTS = (indicator_tables,)
-"""Those left out where solvers choose single points."""
+"""Those left out where solvers choose single points, or there is nothing to compare."""
 
 
 class ReportKeys(msgspec.Struct):
@@ -52,6 +52,7 @@ class ReportKeys(msgspec.Struct):
     reference: ReferenceKey = None
     nominal: Text | None = None
     flights: Flag = True
+    figures: tuple[Literal["means"], ...] = ()  # further ones of each comparison
     note: Text = ""
 
 
@@ -115,7 +116,7 @@ def report(
 def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
     """The tables of a comparison as text, written to files with its figures."""
     tables = tables_of(comparison, study)
-    figures = _figures(comparison) if drawn else {}
+    figures = _figures(comparison, study.get("figures", ())) if drawn else {}
     shown: Flights | VariablesAlongFront | None = None
     if study.get("flights", True):
         shown = Flights.of(comparison) or VariablesAlongFront.of(comparison)
@@ -133,7 +134,8 @@ def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, 
 
 def tables_of(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
     """{name of a file: table} of a comparison, but that of the flights that stand for each front."""
-    kinds = [kind for kind in TABLES if kind not in OF_FRONTS or not only_choices(comparison)]
+    compared = not comparison.against.alone and not only_choices(comparison)
+    kinds = [kind for kind in TABLES if compared or kind not in OF_FRONTS]
     return {name: one for kind in kinds for name, one in kind(comparison, study).items()}
 
 
@@ -168,13 +170,16 @@ def _left_out(comparison: Comparison) -> list[str]:
     return ["\n".join(lines)] if lines else []
 
 
-def _figures(comparison: Comparison) -> dict[str, Figure]:
-    """{name of a file: figure} of a comparison."""
+def _figures(comparison: Comparison, further: Sequence[str]) -> dict[str, Figure]:
+    """{name of a file: figure} of a comparison, and `further` ones: "means" has the mean objectives of the front of each run."""
     reference = comparison.against
     name = "truth" if reference.true else "reference"
     found: dict[str, Figure] = choices_figures(comparison)
-    if not len(reference.front):
+    if not len(reference.front) or reference.alone:
         return found
+    if "means" in further:
+        means = {solver: [one.objectives.mean(axis=0)[None] for one in fronts if len(one)] for solver, fronts in comparison.fronts.items()}
+        found["means"] = front_figure(means, goals=comparison.known.goals)
     if len(comparison.known.goals) > 1:
         found["fronts"] = front_figure(comparison.fronts, goals=comparison.known.goals, reference=reference.front, truth_name=name)
     if only_choices(comparison):

@@ -29,7 +29,7 @@ GOAL = {"objective": "distance", "best": 20.0, "worst": 0.0}
 PAPER = [
     {"of": "indicators", **WORDS, "rows": [{**ROW, "gd_mean": 0.5, "igd_mean": 0.25, "seconds": 100.0}]},
     {"of": "hypervolume", "point": [10.0, 0.0], "rows": [{**ROW, "best": 3.0}]},
-    {"of": "objectives", "rows": [{**ROW, "statistic": "greatest", "distance": 7.0}]},
+    {"of": "objectives", "rows": [{**ROW, "statistic": one, "distance": 7.0} for one in ("greatest", "mean", "variance")]},
 ]
 
 
@@ -245,7 +245,7 @@ MISS = [{"name": "miss", "state": "y", "at": 1}]
         ({"of": "hypervolume", "point": [1.0, 2.0, 3.0], "rows": [{**ROW, "best": 3}]}, "'glide': point: 3 numbers, but 2 objectives"),
         ({"of": "hypervolume", "point": [1.0, 2.0], "rows": [{**ROW, "problem": "glid", "best": 3}]}, "row 1: unknown problem 'glid'"),
         ({"of": "objectives", "rows": [MEAN | {"time": 1}, {**MEAN, "by": "x", "range": 2}]}, "row 2: unknown objective 'range'; there"),
-        ({"of": "ends", "ends": MISS, "rows": [MEAN | {"miss": 1}]}, "'miss': unknown state 'y'; there are x"),
+        ({"of": "objectives", "measures": MISS, "rows": [MEAN | {"miss": 1}]}, "'miss': unknown state 'y'; there are x"),
         ({"of": "designs", "rows": [{**ROW, "time": 3}]}, "problem 'glide': the design 'the paper' has no distance"),
         ({"of": "designs", "rows": [{**ROW, "time": 0, "distance": 3}]}, "the design 'the paper' has no time other than 0"),
         ({"of": "feasibility", "rows": [{**ROW, "points": 3}]}, "none of the study's has one: one, other, broken"),

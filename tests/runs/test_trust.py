@@ -113,7 +113,7 @@ def test_a_definition_runs_no_code_of_its_own(mark, out, refused, reference):
         ("study.json", ("study", "cells"), {"a": 1}),
         ("study.json", ("study", "verify"), "much"),
         ("study.json", ("study", "reference"), 7),
-        ("study.json", ("study", "paper"), [{"of": "ends", "rows": [{}]}]),
+        ("study.json", ("study", "paper"), [{"of": "objectives", "rows": [{}]}]),
         ("study.json", ("study", "goal"), {"objective": 3}),
         ("study.json", ("study", "nominal"), ["x"]),
         ("study.json", ("version",), 1),
