@@ -91,10 +91,11 @@ class NSGA2(Ranked):
         "penalty": `penalty` times the violation is added to each objective. "objective": the violation is an additional objective.
     penalty : float, default 1000
         Factor for handling="penalty", in units of the objectives, at least 0.
-    degree : {"largest", "sum", "log", "printed"}, default "largest"
+    degree : {"largest", "sum", "log", "capped", "printed"}, default "largest"
         Violation by which infeasible points are compared: the largest of all constraints, the sum over the constraints, the sum of
-        log(1 + violation), or the sum with each violation at most 1 (Chai and others 2020, as printed). It does not change which points are
-        feasible.
+        log(1 + violation), the sum with each violation at most 1, or "printed", the sum as in eqs. (16)-(18) of Chai and others (2020): a
+        violation of 1 or more counts as 1, a smaller one in parts of the largest of those that are evaluated with it. Eq. (17) treats
+        equalities alike, without the former. It does not change which points are feasible.
 
     Raises
     ------

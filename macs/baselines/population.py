@@ -23,7 +23,9 @@ Presented = tuple[np.ndarray, np.ndarray]
 SUMS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "sum": lambda v: v.sum(axis=1),  # eq. (18) with eq. (16) without its upper bound
     "log": lambda v: np.log1p(v).sum(axis=1),
-    "printed": lambda v: np.minimum(v, 1.0).sum(axis=1),  # each at most 1, twice the limit: eqs. (16)-(18) as printed
+    "capped": lambda v: np.minimum(v, 1.0).sum(axis=1),  # with g_max = 2 g*, with which eq. (16) does not jump
+    # Eqs. (16)-(18) as printed: in parts of the largest of the generation, and 1 from twice the limit on.
+    "printed": lambda v: np.where(v < 1.0, v / v.max(axis=0, initial=1e-300, where=np.isfinite(v)), 1.0).sum(axis=1),
 }
 """Degrees (k,) of violations v (k, c) by name, after Chai and others (2020)."""
 DEGREES = ("largest", *SUMS)

@@ -55,7 +55,8 @@ def test_a_heating_rate_and_a_pressure_by_hand() -> None:
     assert by("largest").tolist() == pytest.approx([0.25, 0.5, 1.5, 4.0])
     assert by("sum").tolist() == pytest.approx([0.25, 0.75, 2.5, 7.5])
     assert by("log").tolist() == pytest.approx([np.log(1.25), np.log(1.5) + np.log(1.25), np.log(2.5 * 2), np.log(4.5 * 5)])
-    assert by("printed").tolist() == pytest.approx([0.25, 0.75, 2.0, 2.0])  # eq. (16) saturates at twice the limit
+    assert by("capped").tolist() == pytest.approx([0.25, 0.75, 2.0, 2.0])  # at twice the limit
+    assert by("printed").tolist() == pytest.approx([0.25 / 3.5, 0.5 / 3.5 + 0.25 / 4.0, 2.0, 2.0])  # g_max: 900 and 1400
 
 
 def test_what_failed_or_is_no_number_is_violated_infinitely_and_what_is_within_the_tolerance_not():
@@ -63,7 +64,7 @@ def test_what_failed_or_is_no_number_is_violated_infinitely_and_what_is_within_t
     worst = np.array([0.3, 5e-7, np.inf, np.inf])
     for name in DEGREES[1:]:
         found = degree(name, worst, lambda: v, 1e-6)
-        assert found[0] == pytest.approx(np.log1p(0.3) if name == "log" else 0.3) and found[1] == 0
+        assert found[0] == pytest.approx({"log": np.log1p(0.3), "printed": 1.0}.get(name, 0.3)) and found[1] == 0
         assert np.isinf(found[2:]).all()
     violation = np.array([1.0, 1.0, 1.0, np.inf])
     for name in ("sum", "log"):
