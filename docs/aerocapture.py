@@ -28,12 +28,13 @@ def main() -> None:
     with style():
         figure = new_figure(PAGE, 4.6)
         (angle, burn), (altitude, speed) = figure.subplots(2, 2, sharex="row")
-        exits = np.linspace(*exit_speeds(), 2001)
+        least, most = exit_speeds()
+        exits = least + 1e-6 + (most - least - 1e-6) * np.linspace(0.0, 1.0, 2001) ** 2
         angle.plot(exits, np.degrees([exit_angle(one) for one in exits]), color=COLORS[0])
         burn.plot(exits, circularisation(exits), color=COLORS[0])
-        for ax, printed, of in ((angle, EXIT[1], "path angle [deg]"), (burn, EXIT[2], "delta v [m/s]")):
+        for ax, printed, label in ((angle, EXIT[1], "path angle at the exit [deg]"), (burn, EXIT[2], "delta v [m/s]")):
             ax.plot(EXIT[:1], [printed], **PRINTED)
-            ax.set(xlabel="exit speed [m/s]", ylabel=f"{of.partition(' [')[0]} at the exit [deg]" if ax is angle else of)
+            ax.set(xlabel="exit speed [m/s]", ylabel=label)
         print(f"exits of {exits[0]:.1f} to {exits[-1]:.1f} m/s; delta v from {circularisation(exits[-1]):.2f} m/s")
         print(f"at {EXIT[0]:g} m/s: {np.degrees(exit_angle(EXIT[0])):.2f} deg, {circularisation(EXIT[0]):.2f} m/s")
         for color, (name, (ballistic, lowest, entry)) in zip(COLORS, TABLE_1.items(), strict=False):
