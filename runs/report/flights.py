@@ -38,6 +38,11 @@ Law = Mapping[str, np.ndarray]
 LAW_LOOK: Mapping[str, Any] = {"color": "black", "lw": 0.9, "ls": (0, (4, 2))}
 
 
+def _nothing(states: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+    """What is derived of states where a case says nothing."""
+    return {}
+
+
 def representatives(front: Front, count: int = 4) -> list[int]:
     """Numbers of `count` converged points that stand for a front: the best of each objective, and others spread evenly between them."""
     good = np.flatnonzero(front.status == CONVERGED)
@@ -90,11 +95,11 @@ class Flights:
         """{name of a file: figure}."""
         law: Callable[[float], Law] | None = getattr(self.case, "optimal_flight", None)
         laws = [law(float(point.trajectory.phases[-1].time[-1])) if law and point.trajectory else None for point in self.points]
-        known = {"laws": laws, "law_name": getattr(self.case, "LAW", "known law")}
-        more = {"derived": self.case.derived} if hasattr(self.case, "derived") else {}
-        found = {"flights": flights_figure(self.points, **known, **more, solver=self.solver)}
-        if hasattr(self.case, "track"):
-            found["paths"] = paths_figure(self.points, self.case.track, **known)
+        name, track = getattr(self.case, "LAW", "known law"), getattr(self.case, "track", None)
+        derived = getattr(self.case, "derived", _nothing)
+        found = {"flights": flights_figure(self.points, laws=laws, law_name=name, solver=self.solver, derived=derived)}
+        if track is not None:
+            found["paths"] = paths_figure(self.points, track, laws=laws, law_name=name)
         if len(self.comparison.known.goals) > 1:
             found["representatives"] = front_figure(
                 {self.solver: self.comparison.fronts[self.solver]},
@@ -171,7 +176,7 @@ def flights_figure(
     law_name: str = "",
     solver: str = "",
     names: Sequence[str] = (),
-    derived: Derived = lambda _: {},
+    derived: Derived = _nothing,
 ) -> Figure:
     """A column for each point, a row for each state, what is derived of them, and each control over time, with the optimal law of each as a
     dashed line where there is one; the point's number, from 1, and its objectives above."""
@@ -221,9 +226,9 @@ def paths_figure(points: Sequence[Point], track: Derived, *, laws: Sequence[Law 
         figure = new_figure(COLUMN, 2.6)
         ax = figure.subplots()
         for number, (point, color) in enumerate(zip(points, COLORS, strict=False), 1):
-            for phase in point.trajectory.phases if point.trajectory is not None else ():
+            for k, phase in enumerate(point.trajectory.phases if point.trajectory is not None else ()):
                 labels, places = zip(*track({name: values for name, (_, values) in _lines(phase).items()}).items(), strict=True)
-                ax.plot(*places, color=color, lw=1.3, label=f"point {number}" if phase is point.trajectory.phases[0] else None)
+                ax.plot(*places, color=color, lw=1.3, label=None if k else f"point {number}")
         for law in filter(None, laws):
             ax.plot(*track(law).values(), **LAW_LOOK, zorder=3, label=law_name if law is laws[0] else None)
         ax.set(xlabel=labels[0], ylabel=labels[1])
@@ -234,7 +239,7 @@ def paths_figure(points: Sequence[Point], track: Derived, *, laws: Sequence[Law 
     return figure
 
 
-def _lines(phase: PhaseTrajectory, derived: Derived = lambda _: {}) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _lines(phase: PhaseTrajectory, derived: Derived = _nothing) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """{name: times and values} of states, controls and what is derived of states, along every element."""
     found = {one.name: along(phase, one.name) for one in (*phase.state_variables, *phase.control_variables)}
     times = found[phase.state_variables[0].name][0]

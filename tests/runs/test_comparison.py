@@ -23,8 +23,9 @@ MEASURES = [
     *({"name": take, "state": "v", "take": take} for take in ("first", "greatest")),
 ]
 ROW = {"problem": "braking", "by": "the paper"}
+STATED = ("least", "mean", "standard deviation")
 PAPER = [
-    {"of": "objectives", "measures": MEASURES, "rows": [{**ROW, "statistic": one, "miss": 5.0} for one in ("least", "mean", "standard deviation")]},
+    {"of": "objectives", "measures": MEASURES, "rows": [{**ROW, "statistic": one, "miss": 5.0} for one in STATED]},
     {"of": "feasibility", "rows": [{**ROW, "first_feasible": 19, "points": 50}]},
     {"of": "hypervolume", "point": [0.0, 20.0], "rows": [{**ROW, "best": 3.0}]},
 ]
