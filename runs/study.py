@@ -19,7 +19,7 @@ from .batch import file as studyfile
 from .batch.cells import INNER, Cell, check_inner, combine, sampling, written
 from .batch.store import Store, StoredRun, StudySummary
 from .execution.task import Payload, RunTask
-from .files import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
+from .files import Count, Flag, FurtherFigures, Natural, Positive, Text, checked, errors_begin_with, plain
 from .measures.references import ReferenceKey, check_reference
 from .report.goal import StatedGoal
 from .report.published import check_against
@@ -91,6 +91,8 @@ class Study:
         see `report.sensitivity`.
     flights : bool, default True
         Whether reports show the flights that stand for each front.
+    figures : sequence of str
+        Further figures of reports: "means" has the mean objectives of the front of each run.
     note : str
         Text that stands at the beginning of the report.
     trust : bool
@@ -131,6 +133,7 @@ class Study:
     nominal: str | None = field(metadata=_key(), default=None)
     dispersions: Mapping[str, Any] | None = field(metadata=_key(), default=None)
     flights: bool = field(metadata=_key(Flag), default=True)
+    figures: Sequence[str] = field(metadata=_key(FurtherFigures), default=())
     note: str = field(metadata=_key(Text), default="")
     trust: bool = field(default=True, repr=False)
     cells: tuple[Cell, ...] = field(init=False, repr=False)

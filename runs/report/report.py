@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -19,7 +19,7 @@ from macs.io.atomic import write_whole
 from macs.io.text import counted
 
 from ..batch.store import Store
-from ..files import Flag, Text, check_trusted, checked, errors_begin_with
+from ..files import Flag, FurtherFigures, Text, check_trusted, checked, errors_begin_with
 from ..measures.attainment import attainment
 from ..measures.references import ReferenceKey, read, reference_addresses
 from .choices import choices_figures, choices_tables, only_choices
@@ -52,7 +52,7 @@ class ReportKeys(msgspec.Struct):
     reference: ReferenceKey = None
     nominal: Text | None = None
     flights: Flag = True
-    figures: tuple[Literal["means"], ...] = ()  # further ones of each comparison
+    figures: FurtherFigures = ()
     note: Text = ""
 
 
