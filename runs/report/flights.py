@@ -228,7 +228,9 @@ def paths_figure(points: Sequence[Point], track: Derived, *, laws: Sequence[Law 
         for number, (point, color) in enumerate(zip(points, COLORS, strict=False), 1):
             for k, phase in enumerate(point.trajectory.phases if point.trajectory is not None else ()):
                 labels, places = zip(*track({name: values for name, (_, values) in _lines(phase).items()}).items(), strict=True)
-                ax.plot(*places, color=color, lw=1.3, label=None if k else f"point {number}")
+                order = 3.0 - 0.1 * number  # the first above those that go on
+                ax.plot(*places, color=color, lw=1.8, zorder=order, label=None if k else f"point {number}")
+                ax.plot(*(values[np.isfinite(values)][-1:] for values in places), "o", color=color, ms=3.5, zorder=4)
         for law in filter(None, laws):
             ax.plot(*track(law).values(), **LAW_LOOK, zorder=3, label=law_name if law is laws[0] else None)
         ax.set(xlabel=labels[0], ylabel=labels[1])

@@ -6,7 +6,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -179,7 +179,7 @@ def _figures(comparison: Comparison, further: Sequence[str]) -> dict[str, Figure
         return found
     if "means" in further:
         means = {solver: [one.objectives.mean(axis=0)[None] for one in fronts if len(one)] for solver, fronts in comparison.fronts.items()}
-        found["means"] = front_figure(means, goals=comparison.known.goals)
+        found["means"] = front_figure(means, goals=[replace(goal, name=f"mean {goal.name}") for goal in comparison.known.goals])
     if len(comparison.known.goals) > 1:
         found["fronts"] = front_figure(comparison.fronts, goals=comparison.known.goals, reference=reference.front, truth_name=name)
     if only_choices(comparison):
