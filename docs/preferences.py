@@ -36,11 +36,11 @@ def main() -> None:
             ax.axvline(place, color="black", lw=0.5, ls=":")
             ax.annotate(
                 f"$J_{number}$",
-                (place, 0.0),
+                (place, 1.0),
                 xycoords=("data", "axes fraction"),
-                xytext=(-2, 3),
+                xytext=(0, 1),
                 textcoords="offset points",
-                ha="right",
+                ha="center",
                 va="bottom",
             )
         ax.set(xlabel="objective J", ylabel="preference function", xlim=(J[0], J[-1] + 2.0))
