@@ -6,6 +6,7 @@ A kind of table is a class: the keys that a study file states, and how its figur
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -407,26 +408,25 @@ class TradeOffTable(PublishedTable, tag="trade-offs", kw_only=True):
         return {name: Head(name) for name in self.named}
 
     def ours(self, comparison: Comparison, solver: str) -> list[Figures]:
-        found = [one for one in chosen(comparison) if one.solver == solver and one.label == self.choice]
-        return [row for one in found for row in self._rows(one)]
+        return [row for one in self._chosen(comparison) if one.solver == solver for row in self.gains(one)]
 
-    def _rows(self, one: RunChoice) -> list[Figures]:
-        goals, ranges = one.point.goals, one.ranges
-        spans = np.array([ranges.worst[goal.name] - ranges.best[goal.name] for goal in goals])
-        matrix = trade_offs(one.point).matrix * spans[:, None] / spans
-        return [
-            {STATISTIC: goal.name, **{by.name: float(x) for by, x in zip(goals, row, strict=True)}}
-            for goal, row in zip(goals, matrix, strict=True)
-        ]
+    def gains(self, one: RunChoice) -> list[Figures]:
+        """The rows of a choice; none where its gradients are not known, for a reason that the remark has."""
+        goals, best, worst = one.point.goals, one.ranges.best, one.ranges.worst
+        spans = np.array([worst[goal.name] - best[goal.name] for goal in goals])
+        with suppress(ValueError):
+            matrix = trade_offs(one.point).matrix * spans[:, None] / spans
+            by_goal = (dict(zip((goal.name for goal in goals), row, strict=True)) for row in matrix.tolist())
+            return [{STATISTIC: goal.name, **row} for goal, row in zip(goals, by_goal, strict=True)]
+        return []
 
     def remark(self, comparison: Comparison) -> str:
-        said = [
-            f" {message[0].upper()}{message[1:]}."
-            for one in chosen(comparison)
-            if one.label == self.choice
-            for message in trade_offs(one.point).messages
-        ]
-        return f"of the choice '{self.choice}', in the ranges by which objectives were normalised.{''.join(said)}"
+        messages = [message for one in self._chosen(comparison) for message in trade_offs(one.point).messages]
+        said = "".join(f" {message[0].upper()}{message[1:]}." for message in messages)
+        return f"of the choice '{self.choice}', in the ranges by which objectives were normalised.{said}"
+
+    def _chosen(self, comparison: Comparison) -> list[RunChoice]:
+        return [one for one in chosen(comparison) if one.label == self.choice]
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         check_known("objective", self.named, [goal.name for goal in problem.goals])

@@ -8,7 +8,11 @@ import pytest
 from misbehaving import glide
 from test_study import Inline
 
+from macs.decisions import FuzzyGoal, Ranges, decide
 from runs import Study
+from runs.batch.store import Store
+from runs.report.choices import RunChoice
+from runs.report.comparison import comparisons
 from runs.report.published import papers
 
 GOALS = {"method": "FuzzySatisfactory", "settings": {"targets": {}, "priorities": ["distance", "time"]}}
@@ -88,6 +92,21 @@ def test_what_compares_fronts_is_left_out_and_pictures_are_drawn(folder):
     assert not any("indicators" in name or "attainment" in name for name in names)
     for figure in ("degrees-choices", "flights-choices", "lambda-choices-1"):
         assert (folder / "report" / f"glide-dfet-2x2-{figure}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_trade_offs_beside_published_ones_are_in_ranges_and_positive_where_both_get_better(folder):
+    row = {**ROW, "statistic": "time", "time": 1.0, "distance": -0.5}
+    (paper,) = papers([{"of": "trade-offs", "choice": "even", "rows": [row]}])
+    goal = FuzzyGoal({"time": 1.0, "distance": 15.0})
+    choice = decide(glide(), goal)
+    ranges = Ranges({"time": 1.0, "distance": 15.0}, {"time": 5.0, "distance": 9.0})
+    found = paper.gains(RunChoice("choices", "even", choice.point, np.array([3.0, 9.0]), goal, ranges, [], ""))
+    # A second less costs 3 km: a quarter of the range of times, a half of that of distances.
+    assert [one["statistic"] for one in found] == ["time", "distance"]
+    assert [one[name] for one in found for name in ("time", "distance")] == pytest.approx([1.0, -2.0, -0.5, 1.0], rel=1e-3)
+    (comparison,) = comparisons(Store.open(folder), {})
+    assert paper.ours(comparison, "choices") == [], "the folder does not have the problem"
+    assert "no trade-off matrix" in paper.remark(comparison).lower()
 
 
 def test_eq_53_at_the_printed_memberships():

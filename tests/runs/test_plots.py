@@ -11,7 +11,7 @@ from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
 from runs.measures.attainment import attainment, band, staircase
 from runs.measures.references import foreign
-from runs.report.flights import flights_figure, representatives
+from runs.report.flights import flights_figure, paths_figure, representatives
 from runs.report.plots import attainment_figure, convergence_figure, front_figure
 
 GOALS = (Objective("flight time", "s"), Objective("speed", "km/s", "maximize"))
@@ -90,6 +90,25 @@ def test_flights_side_by_side_and_the_law(tmp_path):
     assert len(figure.axes[0].get_lines()) == 3 and len(figure.axes[1].get_lines()) == 2, "two phases, and the law where there is one"
     assert figure.axes[0].get_title(loc="left").startswith("point 1\ntime ")
     figure.savefig(tmp_path / "flights.png")
+
+
+def test_paths_in_a_plane_and_what_a_case_derives_of_its_states():
+    front = flights(3)
+    points, law = [front[i] for i in range(3)], {"time": np.array([0.0, 5.0]), "h": np.array([1.0, 2.0])}
+
+    def track(states):
+        return {"h [km]": states["h"], "h [m]": 1e3 * states["h"]}
+
+    ax = paths_figure(points, track, laws=[law, None, None], law_name="analytic law").axes[0]
+    drawn = [line for line in ax.get_lines() if line.get_linestyle() == "-"]
+    assert len(drawn) == sum(len(point.trajectory.phases) for point in points)
+    assert (ax.get_xlabel(), ax.get_ylabel(), ax.get_lines()[-1].get_ydata().tolist()) == ("h [km]", "h [m]", [1e3, 2e3])
+    ends = [line for line in ax.get_lines() if line.get_marker() == "o"]
+    assert [float(line.get_ydata()[0]) for line in ends] == pytest.approx([1e3 * ph["h"][-1] for p in points for ph in p.trajectory.phases])
+    figure = flights_figure(points, laws=[law, None, None], derived=lambda states: {"twice h": 2.0 * states["h"]})
+    names = [ax.get_ylabel() for ax in figure.axes if ax.get_ylabel()]
+    assert names == ["h [km]", "v [km/s]", "twice h", "u [km/s²]"], "after the states"
+    assert figure.axes[6].get_lines()[-1].get_ydata().tolist() == [2.0, 4.0]
 
 
 # What many runs attain: surfaces by hand, against moocore and their definition; histories as median and quartiles

@@ -44,6 +44,7 @@ def study(**more) -> Study:
         "verify": None,
         "goal": GOAL,
         "note": "Gliders.",
+        "figures": ["means"],
     }
     return Study("gliders", **given | more)
 
@@ -89,7 +90,7 @@ def test_everything_is_told_and_written(folder):
     stem = "glide-dfet-2x2"
     for name in ("indicators", "comparisons", "overall", "spent", "representatives"):
         assert {f"{stem}-{name}.{suffix}" for suffix in ("txt", "csv", "tex")} <= names
-    for figure in ("fronts", "attainment", "igd-over-evaluations", "hypervolume-over-time", "representatives", "flights"):
+    for figure in ("fronts", "means", "attainment", "igd-over-evaluations", "hypervolume-over-time", "representatives", "flights"):
         assert {f"{stem}-{figure}.{suffix}" for suffix in ("png", "pdf")} <= names
         assert (folder / "report" / f"{stem}-{figure}.png").read_bytes().startswith(b"\x89PNG")
 
