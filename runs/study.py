@@ -16,7 +16,8 @@ from problems.compiled import Objective
 from transcription import Smooth
 
 from .batch import file as studyfile
-from .batch.cells import INNER, Cell, check_inner, combine, sampling, written
+from .batch.cells import INNER, Cell, Modules, check_inner, combine, sampling, written
+from .batch.code import Code, code_of_method
 from .batch.store import Store, StoredRun, StudySummary
 from .execution.task import Payload, RunTask
 from .files import Count, Flag, FurtherFigures, Natural, Positive, Text, checked, errors_begin_with, plain
@@ -142,6 +143,8 @@ class Study:
     """By label of the problem."""
     payloads: Mapping[tuple[str, str, str], Payload] = field(init=False, repr=False)
     """By labels of a cell: its problem and transcription, and its solver, pickled for the processes that run them."""
+    modules: Mapping[tuple[str, str, str], Modules] = field(init=False, repr=False)
+    """By labels of a cell: where the code of its problem, transcription and solver is."""
 
     def __repr__(self) -> str:
         return short_repr(self)
@@ -177,9 +180,10 @@ class Study:
                 check_nominal(self.nominal, stated)
             if self.dispersions is not None:
                 check_dispersions(self.dispersions, stated)
-        object.__setattr__(self, "cells", tuple(cell for cell, _ in combined))
+        object.__setattr__(self, "cells", tuple(cell for cell, *_ in combined))
         object.__setattr__(self, "objectives", {label: tuple(problem.goals) for label, problem in stated.items()})
-        object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload in combined})
+        object.__setattr__(self, "payloads", {cell.labels: payload for cell, payload, _ in combined})
+        object.__setattr__(self, "modules", {cell.labels: modules for cell, _, modules in combined})
 
     @classmethod
     def load(cls, source: str | PathLike[str], trust: bool = False) -> Study:
@@ -209,15 +213,19 @@ class Study:
         jobs: int = 1,
         executor: Executor | None = None,
         retry: bool = False,
+        fresh: bool = False,
         solvers: Sequence[str] | None = None,
         progress: bool = False,
     ) -> StudySummary:
         """Make the runs that `out` does not have yet. Each that has begun goes on from a checkpoint of its own.
 
+        The record of a run has the code that made it, see `batch.code`; a warning says how many are by other code than there is now.
+
         Parameters
         ----------
         out : path
-            A folder, made if it does not exist; see `batch.store` for its files. A finished run in it is neither made again nor changed.
+            A folder, made if it does not exist; see `batch.store` for its files. A finished run in it is neither made again nor changed,
+            unless it is by other code and `fresh`.
         jobs : int
             How many processes of this machine work at a time.
         executor : concurrent.futures.Executor, optional
@@ -225,6 +233,8 @@ class Study:
             process for its runs, so a run that crashes or hangs ends none of the workers.
         retry : bool
             Make those runs again, too, that ended with an exception. Those that were killed or took too long always are.
+        fresh : bool
+            Make those runs again, too, that are by other code than there is now; each is replaced as soon as its new front is there.
         solvers : sequence of str, optional
             Make the runs of these only, by label. Default: of all.
         progress : bool
@@ -249,8 +259,12 @@ class Study:
         check_workers(jobs, executor)
         chosen = self.chosen(solvers)
         with Store.claim(out, self.definition()) as store:
-            execute(store, self.runs, chosen, self._task, jobs, executor, retry, progress)
+            execute(store, self.runs, chosen, self._task, self.code, jobs, executor, retry, fresh, progress)
             return store.summary(self.runs)
+
+    def code(self, cell: Cell) -> Code:
+        """The digests of the modules that a run of a cell depends on; see `batch.code`."""
+        return code_of_method(*self.modules[cell.labels])
 
     def chosen(self, solvers: Sequence[str] | None) -> list[str]:
         """The labels of these solvers, or of all, each once. Raises ValueError if the study has no such solver."""

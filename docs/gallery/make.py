@@ -84,11 +84,11 @@ class Script:
 
     def header(self) -> PageHeader:
         """That of a page which is made now."""
-        return PageHeader.now(f"{COMMAND} {self.name}", self.digest())
+        return PageHeader.now(f"{COMMAND} {self.name}", self.digest(), {})
 
     def result(self) -> tuple[PageHeader, str] | None:
         """Header and result of its page, unless that is of other code or of another problem."""
-        if not self.page.is_file() or not standing(self.page, digest_of)[1]:
+        if not self.page.is_file() or not standing(self.page, now)[1]:
             return None
         text = self.page.read_text(encoding="utf-8")
         before, _, after = text.partition(RESULT)
@@ -123,13 +123,13 @@ def fingerprint(case: str) -> str:
     return load(case).compile().fingerprint
 
 
-def digest_of(command: str) -> str:
+def now(command: str) -> tuple[str, dict[str, str]]:
     """The digest of the problems of a page, from the command that makes it. Raises ValueError if there is no such command."""
     program, _, name = command.rpartition(" ")
     path = HERE / f"{name}.py"
     if program != COMMAND or not re.fullmatch(r"\w+", name) or not path.is_file():
         raise ValueError(f"there is no command '{command}'")
-    return Script.read(path).digest()
+    return Script.read(path).digest(), {}
 
 
 def show(path: Path) -> Shown:
@@ -268,7 +268,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if unknown:
         parser.error(f"there is no script {', '.join(sorted(unknown))}; there are {', '.join(script.name for script in found)}")
     if given.check:
-        current = print_standing((script.page for script in found), digest_of)
+        current = print_standing((script.page for script in found), now)
         differ = [script.name for script in found if not script.is_current()]
         print(f"other than their scripts say: {', '.join(differ)}" if differ else "all are as their scripts say")
         return int(not current or bool(differ))

@@ -19,6 +19,7 @@ from macs.search.rounds import PLANNED_EVALUATIONS
 from macs.solvers.solver import Solver, solver
 from macs.solvers.start import drawing
 from problems import Problem, VectorProblem, load
+from problems.catalogue import address_of
 from problems.checks import check_count
 from problems.compiled import CompiledProblem
 from problems.vector import CompiledVectorProblem, without_dynamics
@@ -29,6 +30,8 @@ from ..execution.task import Addressed, Payload
 from ..files import Section, check_known, checked, errors_begin_with, plain
 
 Statement = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
+Modules = tuple[str, str, str]
+"""Of the problem, the transcription and the solver of a cell."""
 AUTO = "auto"
 """In place of a budget: a search of MACS ends when it is done."""
 WITHOUT = "no transcription"
@@ -181,9 +184,9 @@ def combine(
     terms: Mapping[str, Mapping[str, Any]],
     inner: str | None,
     start: Any,
-) -> tuple[list[tuple[Cell, Payload]], dict[str, CompiledProblem | CompiledVectorProblem], dict[str, Solver]]:
-    """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them; and the problems
-    and solvers by label.
+) -> tuple[list[tuple[Cell, Payload, Modules]], dict[str, CompiledProblem | CompiledVectorProblem], dict[str, Solver]]:
+    """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them, and the modules
+    of these; and the problems and solvers by label.
 
     Parameters are those of `Study`. Raises ValueError that names the problem, transcription, solver or term that is wrong.
     """
@@ -235,7 +238,8 @@ def combine(
             details = {"problem": identity, "transcription": scheme and scheme.to_dict(), "solver": method.about()}
             details |= {"terms": own} if own else {}
             cell = Cell(label, name, solver_label, budget, plain(details))
-            combined.append((cell, (pickles[id(scheme)], _pickled(place, method))))
+            modules = address_of(problem.address).partition(":")[0], type(scheme).__module__, type(method).__module__
+            combined.append((cell, (pickles[id(scheme)], _pickled(place, method)), modules))
     return combined, compiled, methods
 
 

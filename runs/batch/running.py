@@ -3,12 +3,14 @@ terminal and told to other processes by a file."""
 
 from __future__ import annotations
 
+import logging
 import queue
 import time
 import traceback
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
@@ -22,8 +24,11 @@ from problems.checks import check_count
 from ..execution.processes import LocalWorkers, perform_apart
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, RunOutcome, RunTask
 from ..files import checked, read_record, to_record
+from .cells import Cell
+from .code import Code, changed, digest_of_code
 from .store import MISSING, UNREADABLE, Store, StoredRun, reason
 
+log = logging.getLogger(__name__)
 AGAIN = (MISSING, UNREADABLE, KILLED, TIMEOUT, MEMORY)
 """Statuses of runs that are made again. A run that ended with an exception would most likely end so again."""
 PROGRESS_FILE = ".progress"
@@ -164,15 +169,25 @@ def execute(
     count: int,
     solvers: Collection[str],
     task_of: Callable[[StoredRun, Path], RunTask],
+    code_of: Callable[[Cell], Code],
     jobs: int,
     executor: Executor | None,
     retry: bool,
+    fresh: bool,
     progress: bool,
 ) -> None:
-    """Make the runs that a study's folder lacks, `count` of each cell. However this ends, the workers are stopped, and runs finished by
-    then are stored."""
+    """Make the runs that a study's folder lacks, `count` of each cell; if `fresh`, those by other code, too. However this ends, the
+    workers are stopped, and runs finished by then are stored."""
     # The first run of every cell comes first: a study that is stopped early has results in all cells.
     every = sorted((run for run in store.runs(count) if run.cell.solver in solvers), key=lambda run: run.number)
+    older = [run for run in every if run.finished and run.code != code_of(run.cell)]
+    if older and fresh:
+        every = [replace(run, status=MISSING) if run in older else run for run in every]
+    elif older:
+        log.warning(
+            "%s: %d of %d runs are by other code (%s); they stay, and a page of them says so: `--fresh`, fresh=True, makes them again",
+            *(store.path, len(older), len(every), changed_in(older, code_of)),
+        )
     todo = [run for run in every if run.status in AGAIN or (retry and run.status == CRASHED)]
     if not todo:
         return
@@ -182,7 +197,7 @@ def execute(
     with StudyDisplay(store.definition["name"], every, todo, progress, folder=store.path) as display:
 
         def keep(run: StoredRun, outcome: RunOutcome) -> None:
-            store.keep(run, outcome)
+            store.keep(run, outcome, code_of(run.cell))
             display.ended(run, outcome)
 
         def stop() -> None:
@@ -194,7 +209,7 @@ def execute(
         try:
             for run in todo:
                 told = [display.reporter(run)] if executor is None else []  # workers elsewhere cannot call it
-                future = workers.submit(perform_apart, task_of(run, store.checkpoint_path(run)), *told)
+                future = workers.submit(perform_apart, task_of(run, store.checkpoint_path(run, digest_of_code(code_of(run.cell)))), *told)
                 runs[future] = run
                 future.add_done_callback(done.put)
             while runs:
@@ -216,6 +231,13 @@ def execute(
             raise
         finally:
             stop()
+
+
+def changed_in(runs: Sequence[StoredRun], code_of: Callable[[Cell], Code]) -> str:
+    """The modules in which these runs are by other code, in words."""
+    names = sorted({name for run in runs if run.code for name in changed(run.code, code_of(run.cell))})
+    unknown = [] if all(run.code for run in runs) else ["unknown code"]
+    return ", ".join([*unknown, *names[:5], *([f"{len(names) - 5} more"] if len(names) > 5 else [])])
 
 
 def _outcome(future: Future[RunOutcome], left: int) -> RunOutcome:

@@ -2,8 +2,9 @@
 
 study.json      the definition of the study, and the number of runs of each cell
 CELL/RUN.nc     the front of a finished run, 0001.nc being the first: a run is finished once it has one, which is never changed again
-CELL/RUN.json   the record of a run: of a finished one its history, of any other its status and traceback
-CELL/RUN.checkpoint, CELL/RUN.samples   the state of a run that has begun and not ended, written by its own process
+                but by a call that makes runs by other code again
+CELL/RUN.json   the record of a run: the code that made it, of a finished one its history, of any other its status and traceback
+CELL/RUN.CODE.checkpoint, CELL/RUN.CODE.samples   the state of a run that has begun and not ended, written by its own process
 .lock           the lock of the process that runs the study
 .progress       how that process proceeds, written every second and deleted at its end, see `running`
 
@@ -35,9 +36,10 @@ from macs.fronts.files import LARGEST_FRONT
 from macs.io.atomic import read_whole, write_whole
 from macs.io.text import duration, html_block, html_table, text_table
 
-from ..execution.task import FINISHED, History, RunOutcome, SimulationRecord, samples_path
+from ..execution.task import FINISHED, History, RunOutcome, SimulationRecord
 from ..files import Count, Natural, Positive, checked, errors_begin_with, load_front, read_record, to_record
 from .cells import Cell
+from .code import Code
 
 MISSING, UNREADABLE = "missing", "unreadable"
 
@@ -77,7 +79,8 @@ class Details(TypedDict):
 
 
 class RunRecord(msgspec.Struct):
-    """The record of a run, see `RunOutcome`; `front` is the checksum of its front's file. By default that of a run without a record."""
+    """The record of a run, see `RunOutcome`, and its `code`, see `StoredRun`; `front` is the checksum of its front's file. By default that
+    of a run without a record."""
 
     status: Literal["finished", "crashed", "timeout", "out of memory", "killed", "missing"] = "missing"
     message: str = ""
@@ -86,6 +89,7 @@ class RunRecord(msgspec.Struct):
     history: History = {}
     simulated: SimulationRecord = {}
     front: int | None = None
+    code: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,7 @@ class StoredRun:
     history: Mapping[str, Any] = field(repr=False)
     simulated: Mapping[str, Any] = field(repr=False)  # of a finished run whose points were simulated: see `RunOutcome.simulated`
     path: Path  # of its front, whether it exists or not
+    code: Code = field(default_factory=dict, repr=False)  # that made it, see `code`; empty if that is not known
     trust: bool = False  # whether its problem may be loaded from an address that is not in the catalogue
 
     @property
@@ -295,6 +300,7 @@ class Store:
             history=record.history,
             simulated=record.simulated,
             path=path,
+            code=record.code,
             trust=self.trust,
         )
 
@@ -302,25 +308,29 @@ class Store:
         """The state of the study, with the runs that were asked for or `count` of each cell."""
         return StudySummary(self.definition["name"], self.path, tuple(self.runs(count)))
 
-    def checkpoint_path(self, run: StoredRun) -> Path:
-        """Where a run is kept while it lasts, in a folder that is made. The path is absolute, as its process may be in another folder."""
-        path = run.path.with_suffix(".checkpoint").absolute()
+    def checkpoint_path(self, run: StoredRun, code: str) -> Path:
+        """Where a run by the code with this digest is kept while it lasts, so that no other code continues it; in a folder that is made.
+        The path is absolute, as its process may be in another folder."""
+        path = run.path.with_suffix(f".{code}.checkpoint").absolute()
         path.parent.mkdir(exist_ok=True)
         return path
 
-    def keep(self, run: StoredRun, outcome: RunOutcome) -> None:
-        """Write the outcome of a run. Its front comes last and makes it finished; then its checkpoint is deleted. Raises OSError if a file
-        cannot be written."""
-        front, checkpoint = run.path, self.checkpoint_path(run)
+    def keep(self, run: StoredRun, outcome: RunOutcome, code: Code) -> None:
+        """Write the outcome of a run, and the code that made it. Its front comes last and makes it finished; then its checkpoints are
+        deleted. Raises OSError if a file cannot be written."""
+        front = run.path
+        front.parent.mkdir(exist_ok=True)
         checksum = crc32(outcome.front) if outcome.status == FINISHED else None
-        write_whole(front.with_suffix(".json"), to_record({**vars(outcome), "front": checksum}))
+        write_whole(front.with_suffix(".json"), to_record({**vars(outcome), "front": checksum, "code": dict(code)}))
         if outcome.status == FINISHED:
-            if front.exists():
+            if front.exists() and run.status == UNREADABLE:
                 # It could not be read, but it is the user's to delete.
                 front.replace(front.with_name(f"{front.name}.unreadable"))
             write_whole(front, outcome.front)
-            for path in (checkpoint, samples_path(checkpoint)):
+            for path in (*front.parent.glob(f"{front.stem}.*.checkpoint"), *front.parent.glob(f"{front.stem}.*.samples")):
                 path.unlink(missing_ok=True)
+        elif run.status != UNREADABLE:  # what is there is by other code
+            front.unlink(missing_ok=True)
 
 
 def _record(path: Path) -> RunRecord:

@@ -104,8 +104,7 @@ def _measure(one: Bench, rows: list[Row], effort: Any) -> bool:
 
 
 def sources(kind: str) -> list[Path]:
-    """The files of a benchmark, in a fixed order. The search itself is none of them: what is measured is stated here, and a page's version
-    and date say of which search.
+    """The files that state what a benchmark measures, in a fixed order; the search itself is none of them, see `Bench.code`.
 
     Raises ValueError if there is no such benchmark.
     """
@@ -129,4 +128,4 @@ def header_of(
     words += ["--seeds", str(seeds)] if seeds else []
     words += ["--jobs", str(jobs)] if jobs > 1 else []
     words += ["--solvers", *solvers] if solvers else []
-    return PageHeader.now(shlex.join(["macs", "bench", kind, *words, "--page", str(page)]), digest(*sources(kind)))
+    return PageHeader.now(shlex.join(["macs", "bench", kind, *words, "--page", str(page)]), digest(*sources(kind)), BENCHES[kind].code)

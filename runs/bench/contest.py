@@ -5,7 +5,6 @@ The searches are those of studies: in a folder that is kept, the same command ma
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -19,7 +18,6 @@ from macs.front import Front
 from ..measures.indicators import hypervolume, igd
 from ..measures.references import union
 from ..measures.statistics import holm, pairwise, summarise
-from ..report.page import CODE_DIGITS, code
 from ..study import Study
 from . import functions as plain
 from .contract import SECONDS, Bench, Column, Effort, Row, Target, column, rounds_of, short
@@ -67,13 +65,12 @@ class Contest:
         return {one.name: one for one in least if not effort.cases or one.name in effort.cases}
 
     def studies(self, effort: Effort) -> dict[str, Study]:
-        """Studies of all functions that have as many points, by the names of their folders. Searches that other code or other versions of
-        the packages made are in other folders."""
+        """Studies of all functions that have as many points, by the names of their folders."""
         groups: dict[int, list[PlainFunction]] = {}
         for one in self.chosen(effort).values():
             groups.setdefault(one.points, []).append(one)
         return {
-            f"{self.name}-{points}-{code()}": Study(
+            f"{self.name}-{points}": Study(
                 f"{self.name}, {points} points",
                 problems={one.name: one.stated() for one in group},
                 solvers=solvers(self.rivals, points),
@@ -146,18 +143,19 @@ class Contest:
 
 
 def search(batch: Study, folder: Path, effort: Effort) -> None:
-    """Make the searches that a study's folder lacks, of all solvers or only some."""
-    others = sorted(one.name for one in folder.parent.glob(f"{folder.name[:-CODE_DIGITS]}*") if one != folder)
-    if others and not folder.exists():
-        print(f"{batch.name}: searches in {', '.join(others)} are of other code, and are not used", file=sys.stderr)
-    summary = batch.run(folder, jobs=effort.jobs, solvers=effort.solvers or None, progress=True)
+    """Make the searches that a study's folder lacks or has by other code, of all solvers or only some."""
+    summary = batch.run(folder, jobs=effort.jobs, fresh=True, solvers=effort.solvers or None, progress=True)
     if summary.failed:
         raise RuntimeError(f"searches failed, so there is nothing to compare:\n{summary}")
 
 
 def finished_fronts(batch: Study, folder: Path, only: Sequence[str] = ()) -> dict[str, Fronts]:
     """By function: the fronts of the seeds that all solvers have finished, or all of these."""
-    runs = {(run.cell.problem, run.cell.solver, run.number): run for run in batch.status(folder).runs if run.finished}
+    runs = {
+        (run.cell.problem, run.cell.solver, run.number): run
+        for run in batch.status(folder).runs
+        if run.finished and run.code == batch.code(run.cell)
+    }
     who = batch.chosen(only or None)
     fronts: dict[str, Fronts] = {}
     for function in dict.fromkeys(cell.problem for cell in batch.cells):

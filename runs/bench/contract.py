@@ -27,7 +27,9 @@ from macs.io.atomic import write_whole
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from macs.io.text import text_table
+from macs.solvers.solver import SOLVERS
 
+from ..batch.code import code_of, code_of_functions, imported
 from ..report.tables import short
 
 Result = TypeVar("Result")
@@ -151,8 +153,21 @@ class Bench:
     @property
     def sources(self) -> list[Path]:
         """The files that state what is measured."""
-        own = inspect.getfile(self.prepare or self.whole)  # type: ignore[arg-type]
-        return [Path(own), *(Path(str(module.__file__)) for module in self.modules), Path(__file__)]
+        return [*(Path(inspect.getfile(module)) for module in self._modules), Path(__file__)]
+
+    @property
+    def code(self) -> dict[str, str]:
+        """The code that what is measured depends on, see `batch.code`."""
+        names = [module.__name__ for module in self._modules]
+        if self.kept:
+            return code_of_functions(names, [SOLVERS[name].partition(":")[0] for name in ("macs", "nsga2")])
+        return code_of(imported(names))
+
+    @property
+    def _modules(self) -> list[ModuleType]:
+        own = inspect.getmodule(self.prepare or self.whole)
+        assert own is not None
+        return [own, *self.modules]
 
 
 def merge(rows: list[Row], found: Iterable[Row]) -> None:

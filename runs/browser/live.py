@@ -22,7 +22,7 @@ from problems.compiled import Objective
 from ..batch.cells import Cell
 from ..batch.running import ProgressRecord, read_progress
 from ..batch.store import Store, StoredRun, StudySummary
-from ..execution.task import History, samples_path
+from ..execution.task import History
 from ..files import checked, read_record
 from ..report.comparison import compared, comparisons
 from ..report.report import tables_across
@@ -320,9 +320,11 @@ def _going(summary: StudySummary, progress: ProgressRecord | None) -> dict[Key, 
     told = {(one.folder, one.number): one for one in progress.going}
     found: dict[Key, Going] = {}
     for run in summary.runs:
-        key, path = key_of(run), samples_path(run.path.with_suffix(".checkpoint"))
+        key = key_of(run)
+        samples = [(known.st_mtime, one) for one in run.path.parent.glob(f"{run.path.stem}.*samples") if (known := _stat(one))]
+        written, path = max(samples, default=(0.0, run.path.with_suffix(".samples")))
         # On the workers of an executor only the samples show that a run is being made.
-        if not run.finished and (key in told or ((known := _stat(path)) and known.st_mtime >= progress.began)):
+        if not run.finished and (key in told or written >= progress.began):
             last = _last_sample(path)
             found[key] = replace(last, evaluations=told[key].evaluations, elapsed=told[key].elapsed) if key in told else last
     return found

@@ -237,7 +237,8 @@ def run_study(arguments: Namespace) -> int:
     try:
         with wrong_call_on_value_error(), cluster(arguments.dask) if arguments.dask else nullcontext() as executor:
             jobs, retry, solvers = arguments.jobs or 1, arguments.retry, arguments.solvers
-            summary = batch.run(out, jobs=jobs, executor=executor, retry=retry, solvers=solvers, progress=True)
+            chosen = {"retry": retry, "fresh": arguments.fresh, "solvers": solvers}
+            summary = batch.run(out, jobs=jobs, executor=executor, progress=True, **chosen)
     except KeyboardInterrupt:
         print(f"interrupted; {again}", file=sys.stderr)
         return INTERRUPTED

@@ -76,6 +76,7 @@ Batches of independent runs: every problem of a study by every solver. A run is 
 macs study run STUDY     makes the runs that are missing. Stopped, killed, or with more --runs, the same command goes on; finished runs
                          are neither made again nor changed. A run that crashes, hangs beyond the study's time_limit or is killed is
                          recorded and stops no other; those killed or too late are made again by the next call, crashed ones by --retry.
+                         Each run has a record of the code that made it; with --fresh those by other code are made again.
 macs study status DIR    the number of finished, failed and missing runs, and the reasons of failures.
 macs study report DIR    tables, statistics and figures; with --page FILE.md also a page of them, once all runs are finished.
 
@@ -297,6 +298,7 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     run.add_argument("--solvers", metavar="LABEL", nargs="+", help="make the runs of these only (default: of all)")
     run.add_argument("--dask", metavar="ADDRESS", help="work on a Dask cluster, such as tcp://10.0.0.1:8786, instead")
     run.add_argument("--retry", action="store_true", help="make runs again, too, that ended with an exception")
+    run.add_argument("--fresh", action="store_true", help="make runs again, too, that are by other code than there is now")
     run.add_argument("--quick", action="store_true", help="at most 2 runs of 500 evaluations, in a folder of their own (out/NAME-quick)")
     run.add_argument("--trust", action="store_true", help=TRUST)
     status = _add(actions, "status", "how many runs of each cell there are, and why others failed")

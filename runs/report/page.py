@@ -16,13 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import macs
-import problems
-import transcription
 from macs.fronts.provenance import versions
 from macs.io.atomic import check_target, read_whole, write_whole
 from macs.io.text import counted, duration
 
+from ..batch.code import SEVERAL, UNKNOWN, Code, changed, code_of_measures, merged, rooms
 from ..batch.store import Store, StudySummary
 from ..files import DATA_BYTES
 from .published import with_count
@@ -31,12 +29,10 @@ from .tables import Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CODE_DIGITS = 12
-"""Of the digest of the code in a version."""
 OPENS, CLOSES = "<!-- ", " -->"
 """Of a comment, which a page as it is shown does not have."""
-NAMES = {"command": "made by", "digest": "digest", "version": "version", "date": "date"}
-"""Word of each entry on the page."""
+NAMES = {"command": "made by", "digest": "digest", "code": "code", "version": "version", "date": "date"}
+"""Word of each entry on the page. A page need not have one of its code."""
 
 
 @dataclass(frozen=True)
@@ -44,36 +40,53 @@ class PageHeader:
     """The first lines of a page of measured results, a comment:
 
     <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md digest: the SHA-256 of the files that state
-    what is measured, see `digest` version: 0.1.0+c194b98fc0ea date: 2026-01-31 -->
+    what is measured, see `digest` code: macs.search 0a1b2c3d, problems 4e5f6071 version: 0.1.0 date: 2026-01-31 -->
+
+    The page is out of date once digest or code are others.
     """
 
     command: str  # that makes the page
-    digest: str  # of the study file, of the files of a bench, or of problems. The page is out of date once theirs is another.
-    version: str  # of this package when the page was written, and the digest of its code, see `code`. Runs of a study may be of older code.
+    digest: str  # of the study file, of the files of a bench, or of problems
+    version: str  # of this package
     date: str  # year-month-day
+    code: str = ""  # that made its results: the folders of modules that they depend on, each with a digest, see `batch.code`
 
     def __post_init__(self) -> None:
         for name, word in NAMES.items():
             value = getattr(self, name)
-            if not value.strip() or len(value.splitlines()) > 1 or ">" in value:
+            if (not value.strip() and name != "code") or len(value.splitlines()) > 1 or ">" in value:
                 raise ValueError(f"header of a page: '{word}' must be one line without '>', not {value!r}")
 
     @classmethod
-    def now(cls, command: str, digest: str) -> PageHeader:
-        """The header of a page that this command makes today, with the digest of what states it."""
-        return cls(command, digest, version(), date.today().isoformat())
+    def now(cls, command: str, digest: str, code: Code) -> PageHeader:
+        """The header of a page that this command makes today, with the digest of what states it and the code that made its results."""
+        return cls(command, digest, versions()["macs-trajectories"], date.today().isoformat(), written(code))
 
     @classmethod
     def read(cls, text: str) -> PageHeader:
         """The header of a page with this text. Raises ValueError if it begins with none."""
         lines = text.split(CLOSES, 1)[0].removeprefix(OPENS).splitlines() if text.startswith(OPENS) and CLOSES in text else []
         found = dict(line.split(": ", 1) for line in lines if ": " in line)
-        if len(lines) != len(NAMES) or list(found) != list(NAMES.values()):
+        if len(lines) != len(found) or list(found) != [word for word in NAMES.values() if word in found or word != NAMES["code"]]:
             raise ValueError(f"the page does not begin with a comment of {', '.join(NAMES.values())}")
-        return cls(*(found[NAMES[one.name]] for one in fields(cls)))
+        return cls(*(found.get(NAMES[one.name], "") for one in fields(cls)))
 
     def __str__(self) -> str:
-        return OPENS + "\n".join(f"{word}: {getattr(self, name)}" for name, word in NAMES.items()) + CLOSES
+        found = {word: getattr(self, name) for name, word in NAMES.items()}
+        return OPENS + "\n".join(f"{word}: {value}" for word, value in found.items() if value) + CLOSES
+
+    def different(self, digest: str, code: Code) -> list[str]:
+        """What is another now than when the page was made: what states it, and folders of code."""
+        old = dict(one.split(" ") for one in self.code.split(", ")) if self.code else {}
+        return [
+            *(["what states it"] if digest != self.digest else []),
+            *(changed(old, rooms(code)) if old else ["unknown code"] * bool(code)),
+        ]
+
+
+def written(code: Code) -> str:
+    """Folders of code with their digests, in a line."""
+    return ", ".join(f"{room} {digest}" for room, digest in rooms(code).items())
 
 
 def digest(*files: str | PathLike[str], text: str = "") -> str:
@@ -84,34 +97,23 @@ def digest(*files: str | PathLike[str], text: str = "") -> str:
     return found.hexdigest()
 
 
-def code() -> str:
-    """The first 12 of a digest of the code that solves, of all floors but `runs`, and of the versions of the packages it uses."""
-    files = [one for package in (problems, transcription, macs) for one in sorted(Path(package.__path__[0]).rglob("*.py"))]
-    return digest(*files, text=f"{versions()}")[:CODE_DIGITS]
+Now = Callable[[str], tuple[str, Code]]
+"""The digest of what states a page and the code that it depends on, as they are now, from its command; ValueError if there is no such."""
 
 
-def version() -> str:
-    """This package's version with the digest of its code, as a local version is written."""
-    return f"{versions()['macs-trajectories']}+{code()}"
-
-
-def standing(page: Path, digest_of: Callable[[str], str]) -> tuple[str, bool]:
-    """The command of a page or what is wrong with it, and whether the page is as its command would make it now, by the digest.
-
-    Results of other code than there is now are no fault, and are marked as such.
-    """
+def standing(page: Path, now: Now) -> tuple[str, bool]:
+    """The command of a page or what is wrong with it, and whether the page is as its command would make it now."""
     try:
         header = PageHeader.read(page.read_text(encoding="utf-8"))
-        current = digest_of(header.command) == header.digest
+        different = header.different(*now(header.command))
     except (ValueError, OSError) as error:
         return str(error), False
-    other = "" if header.version == version() else ", by other code"
-    return f"{header.command}  ({header.date}{other}{'' if current else ', OUT OF DATE'})", current
+    return f"{header.command}  ({header.date}{', OUT OF DATE: ' if different else ''}{', '.join(different)})", not different
 
 
-def print_standing(pages: Iterable[Path], digest_of: Callable[[str], str]) -> bool:
+def print_standing(pages: Iterable[Path], now: Now) -> bool:
     """Print a line for each page, see `standing`; returns whether all are as their commands would make them now."""
-    found = {page.name: standing(page, digest_of) for page in sorted(pages)}
+    found = {page.name: standing(page, now) for page in sorted(pages)}
     for name, (words, _) in found.items():
         print(f"{name}: {words}")
     return all(good for _, good in found.values())
@@ -129,7 +131,7 @@ class Page:
         if self.path.suffix != ".md":
             raise ValueError(f"a page is a file .md, not '{path}'")
         check_target(self.path)
-        self._header, self._definition = PageHeader.now(command, digest(file)), dict(definition)
+        self._command, self._digest, self._definition = command, digest(file), dict(definition)
         self._parts: list[str] = []
         self._pictures: dict[str, bytes] = {}
 
@@ -171,15 +173,17 @@ class Page:
     def save(self, summary: StudySummary, study: Mapping[str, Any]) -> list[Path]:
         """Write the page and its pictures; returns their paths."""
         times = [run.wall_time for run in summary.runs]
+        code = merged(run.code for run in summary.runs)
+        header = PageHeader.now(self._command, self._digest, {**code, **code_of_measures()})
         first = summary.runs[0].front.stats["versions"]
         what = ", ".join(f"{name} {number}" for name, number in (first or versions()).items() if name != "platform")
         made = (
             f"{counted(len(times), 'run')}, {duration(float(np.sum(times)))} together, {duration(float(np.median(times)))} in the median, "
-            f"on {_machine()}. Seeds are spawned from {study['seed']}. Page made on {self._header.date} by `{self._header.command}`. "
-            f"Versions: {what}."
+            f"on {_machine()}. Seeds are spawned from {study['seed']}. Page made on {header.date} by `{header.command}`. "
+            f"Versions: {what}.{_of_several(code)}"
         )
         texts = [
-            str(self._header),
+            str(header),
             f"\n# {study['name']}\n",
             f"{study['description']}\n",
             *([f"{with_count(study['note'], study)}\n"] if study["note"] else []),
@@ -190,6 +194,13 @@ class Page:
         for path, content in written.items():
             write_whole(path, content)
         return list(written)
+
+
+def _of_several(code: Code) -> str:
+    """A sentence on runs by more than one code, or by one that is not known; empty if there are none."""
+    said = ", ".join(module for module, digest in code.items() if SEVERAL in digest)
+    mixed = f" **Runs are by more than one code**, which differs in {said}." if said else ""
+    return mixed + (" **By which code some runs are was not recorded.**" if UNKNOWN in code else "")
 
 
 def _machine() -> str:

@@ -1,0 +1,134 @@
+"""Makes the pages of measured results: `python docs/measured/make.py` makes those that are out of date, the cheapest first, `--check` says
+which these are and why; names of pages make only these.
+
+A page is out of date once what states it, a study file or the modules of a benchmark, or the code that its results depend on is another
+than when they were made; comments and docstrings are no code. `pages.toml` has all pages, with the minutes of one processor that each takes.
+Killed or interrupted, the same command goes on with the runs that are missing; those in `out` by other code are made again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import shlex
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+from runs.batch.code import code_of_measures, merged
+from runs.bench import BENCHES, sources
+from runs.bench.contest import CONTESTS
+from runs.cli.parser import build_parser
+from runs.report.page import digest, print_standing, standing
+from runs.study import Study
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+STUDIES = ROOT / "runs" / "studies"
+COMMAND = "python docs/measured/make.py"
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
+
+def listed() -> dict[str, tuple[float, str]]:
+    """{name of a page: minutes of one processor, command that makes it}, the cheapest first."""
+    stated = tomllib.loads((HERE / "pages.toml").read_text(encoding="utf-8"))
+    found = {name: (minutes, _page(f"study report out/{name}", name)) for name, minutes in stated["studies"].items()}
+    found |= {name: (minutes, _page(f"bench {words}", name)) for name, (minutes, words) in stated["benches"].items()}
+    return dict(sorted(found.items(), key=lambda one: one[1]))
+
+
+def _page(words: str, name: str) -> str:
+    return f"macs {words} --page docs/measured/{name}.md"
+
+
+def now(command: str) -> tuple[str, dict[str, str]]:
+    """The digest of what states a page and the code that it depends on, from its command. Raises ValueError if there is no such command."""
+    program, *words = shlex.split(command)
+    try:
+        arguments = build_parser().parse_args(words)
+    except SystemExit:
+        raise ValueError(f"there is no command '{command}'") from None
+    if program == "macs" and arguments.command == "bench" and arguments.what and arguments.page:
+        return digest(*sources(arguments.what)), BENCHES[arguments.what].code
+    if program == "macs" and arguments.command == "study" and arguments.action == "report" and arguments.page:
+        file = STUDIES / f"{Path(arguments.folder).name}.toml"
+        study = Study.load(file)
+        return digest(file), {**merged(study.code(cell) for cell in study.cells), **code_of_measures()}
+    raise ValueError(f"'{command}' makes no page")
+
+
+def pages(folder: Path = HERE) -> list[Path]:
+    """Those that are there."""
+    return [folder / f"{name}.md" for name in listed() if (folder / f"{name}.md").is_file()]
+
+
+def make(name: str, command: str, jobs: int) -> bool:
+    """Make the runs of a page that are missing or by other code, and the page. Returns whether it is there. Raises KeyboardInterrupt."""
+    words = shlex.split(command)[1:]
+    if words[0] == "study":
+        return _done(["study", "run", name, "--out", words[2], "--jobs", str(jobs), "--fresh"]) and _done(words)
+    return _done([*words, *(["--jobs", str(jobs), "--keep", f"out/{name}"] if words[1] in CONTESTS else [])])
+
+
+def _done(words: Sequence[str]) -> bool:
+    """Run a command of `macs` in a process of its own; whether it made what it should."""
+    print(f"$ macs {shlex.join(words)}", flush=True)
+    process = subprocess.Popen([sys.executable, "-m", "runs.cli", *words], cwd=ROOT)
+    while True:
+        try:
+            process.wait()
+            break
+        except KeyboardInterrupt:  # the process has it, too, and ends by itself
+            continue
+    if process.returncode == INTERRUPTED:
+        raise KeyboardInterrupt
+    return process.returncode == 0 or (words[0] == "bench" and process.returncode == 1)  # targets that are missed are on its page
+
+
+def seconds() -> float:
+    """Of a processor, of all processes that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
+    """Make what is out of date, or name it; returns the exit code."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Make the pages of measured results that are out of date.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="pages to make, whether they are out of date or not")
+    parser.add_argument("--check", action="store_true", help="make nothing, say which are out of date and why; exit code 1 if any is")
+    parser.add_argument("--jobs", type=int, default=2, help="processes that work at a time (default: 2)")
+    given = parser.parse_args(arguments)
+    known = listed()
+    if unknown := set(given.names) - set(known):
+        parser.error(f"there is no page {', '.join(sorted(unknown))}; there are {', '.join(known)}")
+    if given.check:
+        current = print_standing(pages(folder), now)
+        missing = [name for name in known if not (folder / f"{name}.md").exists()]
+        print(f"not made yet: {', '.join(missing)}" if missing else "all are made")
+        return int(not current or bool(missing))
+    todo = [name for name in known if name in given.names or (not given.names and not standing(folder / f"{name}.md", now)[1])]
+    total = sum(known[name][0] for name in todo)
+    print(f"{len(todo)} pages, about {total / 60:.1f} h of one processor: {', '.join(todo)}", flush=True)
+    failed, began = [], time.perf_counter()
+    try:
+        for number, name in enumerate(todo, 1):
+            before, (stated, command) = seconds(), known[name]
+            failed += [] if make(name, command, given.jobs) else [name]
+            spent, elapsed = (seconds() - before) / 60, (time.perf_counter() - began) / 60
+            print(
+                f"{number} of {len(todo)}: {name}, {spent:.1f} min of a processor ({stated:g} stated); {elapsed:.0f} min so far", flush=True
+            )
+    except KeyboardInterrupt:
+        print("interrupted; the same command goes on from there", file=sys.stderr)
+        return INTERRUPTED
+    if failed:
+        print(f"not made: {', '.join(failed)}", file=sys.stderr)
+    return int(bool(failed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
