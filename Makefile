@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: run test quick test-slow lint docs gallery mutants fuzz kills package clean
+.PHONY: run test quick test-slow lint docs gallery pages mutants fuzz kills package clean
 
 run: $(READY)
 	mkdir -p out
@@ -32,6 +32,11 @@ docs: $(READY)
 # The gallery's pages that are out of date, in docs/gallery: some minutes for all of them.
 gallery: $(READY)
 	$(BIN)/python docs/gallery/make.py
+
+# The pages of measured results that are out of date, in docs/measured, or `make pages STUDY=goddard-table3`: all within eight hours on two
+# processors. Stopped, the same again goes on. `python docs/measured/make.py --check` says which are out of date and why.
+pages: $(READY)
+	$(BIN)/python docs/measured/make.py $(STUDY)
 
 # Changes the lines that judge, one by one, and counts what the tests notice: about an hour, or one with `make mutants MODULE=dominance`.
 mutants: $(READY)

@@ -15,18 +15,19 @@ from runs.cli import main
 from runs.report.page import PageHeader, digest
 
 ROOT = Path(__file__).parents[1]
-SCRIPT = ROOT / "docs" / "measured" / "check.py"
-spec = importlib.util.spec_from_file_location("check_measured", SCRIPT)
+SCRIPT = ROOT / "docs" / "measured" / "make.py"
+spec = importlib.util.spec_from_file_location("make_measured", SCRIPT)
 assert spec is not None and spec.loader is not None
-check = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(check)
+make = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(make)
 PAGES = [page for page in SCRIPT.parent.glob("*.md") if page.name not in ("index.md", "README.md")]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_page_has_a_header_and_a_command_that_exists(page):
     header = PageHeader.read(page.read_text(encoding="utf-8"))
-    assert all(file.is_file() for file in check.files_of(header.command))
+    assert page.stem in make.listed() and f"--page docs/measured/{page.name}" in header.command
+    assert all(file.is_file() for file in make.files_of(header.command))
 
 
 def test_every_benchmark_is_of_files():
@@ -57,6 +58,7 @@ def made(tmp_path, monkeypatch) -> Path:
     stub(monkeypatch)
     page = tmp_path / "bench-population.md"
     assert main(["bench", "population", "--quick", "--page", str(page)]) == 0
+    monkeypatch.setattr(make, "listed", lambda: {page.stem: (1, "")})
     return page
 
 
@@ -67,17 +69,18 @@ def test_a_page_of_a_benchmark(tmp_path, monkeypatch, capsys):
     assert header.command == f"macs bench population --quick --page {page}" and header.digest == digest(*sources("population"))
     assert "POPULATIONS" in text and "at least 4 times as fast" in text and text.count("```") == 2
     assert "POPULATIONS" in capsys.readouterr().out
-    assert check.main(tmp_path) == 0
+    assert make.main(["--check"], tmp_path) == 0
     said = capsys.readouterr().out
-    assert f"bench-population.md: {header.command}" in said and "other code" not in said
-    page.write_text(text.replace("+", "+0", 1))
-    assert check.main(tmp_path) == 0 and "by other code" in capsys.readouterr().out
+    assert f"bench-population.md: {header.command}" in said and "OUT OF DATE" not in said
+    monkeypatch.setattr(make, "listed", lambda: {page.stem: (1, ""), "another": (1, "")})
+    assert make.main(["--check"], tmp_path) == 1 and "not made yet: another" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("digest: ", "digest: 0", "OUT OF DATE"),
+        ("digest: ", "digest: 0", "OUT OF DATE: what states it"),
+        ("version: ", "code: macs.search 0\nversion: ", "OUT OF DATE: macs.search"),
         ("macs bench population", "macs bench populations", "there is no"),
         ("macs bench population", "macs list", "there is no command"),
         ("--page", "--csv", "makes no page"),
@@ -88,11 +91,35 @@ def test_pages_that_are_wrong_are_named(old, new, words, tmp_path, monkeypatch, 
     page = made(tmp_path, monkeypatch)
     page.write_text(page.read_text().replace(old, new, 1))
     capsys.readouterr()
-    assert check.main(tmp_path) == 1 and words in capsys.readouterr().out
+    assert make.main(["--check"], tmp_path) == 1 and words in capsys.readouterr().out
 
 
 def test_a_page_of_a_study_is_of_its_file():
-    assert check.files_of("macs study report out/goddard-table3") == [ROOT / "runs" / "studies" / "goddard-table3.toml"]
+    assert make.files_of("macs study report out/goddard-table3") == [ROOT / "runs" / "studies" / "goddard-table3.toml"]
+
+
+def test_every_page_is_listed_with_its_minutes():
+    listed = make.listed()
+    assert {page.stem for page in PAGES} <= listed.keys() and list(listed.values()) == sorted(listed.values())
+    assert all(file.is_file() for _, command in listed.values() for file in make.files_of(command))
+    assert sum(minutes for minutes, _ in listed.values()) <= 16 * 60, "eight hours of two processors"
+
+
+def test_what_is_out_of_date_is_made_again_the_cheapest_first(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(make, "listed", lambda: {"bench-zdt": (1, "macs bench zdt"), "mine": (60, "macs study report out/mine")})
+    ran: list[list[str]] = []
+    monkeypatch.setattr(make, "_done", lambda words: bool(ran.append(words)) or "mine" not in words)
+    assert make.main([], tmp_path) == 1
+    said = capsys.readouterr()
+    assert "2 pages, about 1.0 h" in said.out and "not made: mine" in said.err
+    assert ran == [
+        ["bench", "zdt", "--jobs", "2", "--keep", "out/bench-zdt"],
+        ["study", "run", "mine", "--out", "out/mine", "--jobs", "2", "--fresh"],
+    ]
+    monkeypatch.setattr(make, "_done", lambda words: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert make.main(["mine"], tmp_path) == make.INTERRUPTED and "goes on" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        make.main(["yours"], tmp_path)
 
 
 def test_what_was_interrupted_makes_no_page(tmp_path, monkeypatch, capsys):
@@ -121,7 +148,7 @@ def test_the_script_runs_by_itself():
 
 
 def test_terms_of_table_vii_are_those_that_its_study_of_parametrisations_found_the_best():
-    choosing, stating = (tomllib.loads((check.STUDIES / f"reentry-{name}.toml").read_text()) for name in ("parametrisations", "table7"))
+    choosing, stating = (tomllib.loads((make.STUDIES / f"reentry-{name}.toml").read_text()) for name in ("parametrisations", "table7"))
     best: dict[str, tuple[float, str, str]] = {}
     section = ""
     inside = False

@@ -2,7 +2,7 @@
 which these are and why; names of pages make only these.
 
 A page is out of date once what states it, a study file or the modules of a benchmark, or the code that its results depend on is another
-than when they were made; comments and docstrings are no code. `pages.toml` has all pages, with the minutes of one processor that each takes.
+than when they were made; comments and docstrings are no code. `pages.toml` has all pages, with the minutes of a processor that each takes.
 Killed or interrupted, the same command goes on with the runs that are missing; those in `out` by other code are made again.
 """
 
@@ -45,20 +45,27 @@ def _page(words: str, name: str) -> str:
     return f"macs {words} --page docs/measured/{name}.md"
 
 
-def now(command: str) -> tuple[str, dict[str, str]]:
-    """The digest of what states a page and the code that it depends on, from its command. Raises ValueError if there is no such command."""
+def files_of(command: str) -> list[Path]:
+    """The files that state what a command measures. Raises ValueError if there is no such command."""
     program, *words = shlex.split(command)
     try:
         arguments = build_parser().parse_args(words)
     except SystemExit:
         raise ValueError(f"there is no command '{command}'") from None
     if program == "macs" and arguments.command == "bench" and arguments.what and arguments.page:
-        return digest(*sources(arguments.what)), BENCHES[arguments.what].code
-    if program == "macs" and arguments.command == "study" and arguments.action == "report" and arguments.page:
-        file = STUDIES / f"{Path(arguments.folder).name}.toml"
-        study = Study.load(file)
-        return digest(file), {**merged(study.code(cell) for cell in study.cells), **code_of_measures()}
+        return sources(arguments.what)
+    if program == "macs" and arguments.command == "study" and arguments.action == "report":
+        return [STUDIES / f"{Path(arguments.folder).name}.toml"]
     raise ValueError(f"'{command}' makes no page")
+
+
+def now(command: str) -> tuple[str, dict[str, str]]:
+    """The digest of what states a page and the code that it depends on, from its command. Raises ValueError if there is no such command."""
+    files = files_of(command)
+    if files[0].suffix != ".toml":
+        return digest(*files), BENCHES[shlex.split(command)[2]].code
+    study = Study.load(files[0])
+    return digest(*files), {**merged(study.code(cell) for cell in study.cells), **code_of_measures()}
 
 
 def pages(folder: Path = HERE) -> list[Path]:

@@ -25,7 +25,7 @@ from ..execution.processes import LocalWorkers, perform_apart
 from ..execution.task import CRASHED, FINISHED, KILLED, MEMORY, TIMEOUT, RunOutcome, RunTask
 from ..files import checked, read_record, to_record
 from .cells import Cell
-from .code import Code, changed, digest_of_code
+from .code import UNKNOWN, Code, changed, digest_of_code
 from .store import MISSING, UNREADABLE, Store, StoredRun, reason
 
 log = logging.getLogger(__name__)
@@ -184,10 +184,9 @@ def execute(
     if older and fresh:
         every = [replace(run, status=MISSING) if run in older else run for run in every]
     elif older:
-        log.warning(
-            "%s: %d of %d runs are by other code (%s); they stay, and a page of them says so: `--fresh`, fresh=True, makes them again",
-            *(store.path, len(older), len(every), changed_in(older, code_of)),
-        )
+        names = sorted({name for run in older for name in (changed(run.code, code_of(run.cell)) if run.code else [UNKNOWN])})
+        what = store.path, len(older), len(every), ", ".join(names[:5])
+        log.warning("%s: %d of %d runs are by other code (%s, ...); they stay: `--fresh`, fresh=True, makes them again", *what)
     todo = [run for run in every if run.status in AGAIN or (retry and run.status == CRASHED)]
     if not todo:
         return
@@ -231,13 +230,6 @@ def execute(
             raise
         finally:
             stop()
-
-
-def changed_in(runs: Sequence[StoredRun], code_of: Callable[[Cell], Code]) -> str:
-    """The modules in which these runs are by other code, in words."""
-    names = sorted({name for run in runs if run.code for name in changed(run.code, code_of(run.cell))})
-    unknown = [] if all(run.code for run in runs) else ["unknown code"]
-    return ", ".join([*unknown, *names[:5], *([f"{len(names) - 5} more"] if len(names) > 5 else [])])
 
 
 def _outcome(future: Future[RunOutcome], left: int) -> RunOutcome:

@@ -29,7 +29,7 @@ from macs.io.interrupts import Stopped
 from macs.io.text import text_table
 from macs.solvers.solver import SOLVERS
 
-from ..batch.code import code_of, code_of_functions, imported
+from ..batch.code import code_of, code_of_method, imported, merged
 from ..report.tables import short
 
 Result = TypeVar("Result")
@@ -159,15 +159,12 @@ class Bench:
     def code(self) -> dict[str, str]:
         """The code that what is measured depends on, see `batch.code`."""
         names = [module.__name__ for module in self._modules]
-        if self.kept:
-            return code_of_functions(names, [SOLVERS[name].partition(":")[0] for name in ("macs", "nsga2")])
-        return code_of(imported(names))
+        searches = [code_of_method("", "", SOLVERS[name].partition(":")[0]) for name in ("macs", "nsga2")]
+        return merged(searches) if self.kept else code_of(imported(names))
 
     @property
-    def _modules(self) -> list[ModuleType]:
-        own = inspect.getmodule(self.prepare or self.whole)
-        assert own is not None
-        return [own, *self.modules]
+    def _modules(self) -> list[Any]:
+        return [inspect.getmodule(self.prepare or self.whole), *self.modules]
 
 
 def merge(rows: list[Row], found: Iterable[Row]) -> None:

@@ -197,10 +197,9 @@ class Page:
 
 
 def _of_several(code: Code) -> str:
-    """A sentence on runs by more than one code, or by one that is not known; empty if there are none."""
-    said = ", ".join(module for module, digest in code.items() if SEVERAL in digest)
-    mixed = f" **Runs are by more than one code**, which differs in {said}." if said else ""
-    return mixed + (" **By which code some runs are was not recorded.**" if UNKNOWN in code else "")
+    """A sentence on runs by more than one code, which may not be known; empty if there are none."""
+    names = ", ".join(module for module, digest in code.items() if SEVERAL in digest or module == UNKNOWN)
+    return f" **Runs are by more than one code**, which differs in {names}." if names else ""
 
 
 def _machine() -> str:

@@ -2,6 +2,7 @@
 
 import hashlib
 import shutil
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -13,11 +14,9 @@ from test_study import Inline
 from macs import NSGA2
 from macs.front import Front
 from macs.fronts.points import Points
-from macs.fronts.provenance import versions
 from runs import Study
 from runs.batch.store import Store
 from runs.cli import main
-from runs.report import page as page_header
 from runs.report.comparison import AXES, CHARGED, Charge, comparisons, histories, spent
 from runs.report.page import PageHeader, digest
 
@@ -158,25 +157,18 @@ def test_unions_hold_only_what_a_simulation_found(place, tmp_path):
 def test_header_as_written_is_read_again(tmp_path):
     file = tmp_path / "study.toml"
     file.write_bytes(b'name = "one"\n')
-    header = PageHeader.now("macs study report out/one --page one.md", digest(file))
+    header = PageHeader.now("macs study report out/one --page one.md", digest(file), {"macs.search.macs": "1", "macs.search.trials": "2"})
     assert header.date == date.today().isoformat()
     assert header.digest == hashlib.sha256(b'name = "one"\n').hexdigest() == digest(file)
     text = str(header)
     assert text.splitlines()[0] == "<!-- made by: macs study report out/one --page one.md"
-    assert [line.split(": ")[0] for line in text.splitlines()[1:]] == ["digest", "version", "date"] and text.endswith(" -->")
+    assert [line.split(": ")[0] for line in text.splitlines()[1:]] == ["digest", "code", "version", "date"] and text.endswith(" -->")
     assert PageHeader.read(f"{text}\n\n# One\n\n<!-- more -->\n") == header
-
-
-def test_the_version_is_of_the_code_that_searches(tmp_path, monkeypatch):
-    (tmp_path / "macs").mkdir()
-    module = tmp_path / "macs" / "search.py"
-    module.write_text("step = 1\n")
-    monkeypatch.setattr(page_header.macs, "__path__", [str(tmp_path / "macs")])
-    before = page_header.code()
-    assert page_header.code() == before and len(before) == page_header.CODE_DIGITS
-    assert page_header.version() == f"{versions()['macs-trajectories']}+{before}"
-    module.write_text("step = 2\n")
-    assert page_header.code() != before
+    assert not header.different(digest(file), {"macs.search.macs": "1", "macs.search.trials": "2"})
+    assert header.different("other", {"macs.search.macs": "2", "macs.search.trials": "2"}) == ["what states it", "macs.search"]
+    gallery = replace(header, code="")
+    assert PageHeader.read(str(gallery)) == gallery and not gallery.different(digest(file), {})
+    assert gallery.different(digest(file), {"macs.search.macs": "1"}) == ["unknown code"]
 
 
 @pytest.mark.parametrize("text", ["# One\n", "<!-- made by: x\ndigest: y\nversion: z -->", "<!-- made by: x"])

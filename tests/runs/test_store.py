@@ -37,7 +37,7 @@ def store(tmp_path: Path):
 def finish(store: Store, number: int = 0, seconds: float = 2.0, **more) -> None:
     """Keep the outcome of one of all runs."""
     outcome = RunOutcome("finished", front=content(), wall_time=seconds, **more)
-    store.keep(list(store.runs())[number], outcome)
+    store.keep(list(store.runs())[number], outcome, {"macs.search": "1"})
 
 
 def test_what_is_kept_is_found_again_and_all_else_is_missing(store):
@@ -59,7 +59,7 @@ def test_what_is_kept_is_found_again_and_all_else_is_missing(store):
 
 @pytest.mark.parametrize("status", ["crashed", "timeout", "out of memory", "killed"])
 def test_what_failed_has_its_reason_and_no_front(store, status):
-    store.keep(list(store.runs())[2], RunOutcome(status, message="no air", traceback="line 1", wall_time=1.0))
+    store.keep(list(store.runs())[2], RunOutcome(status, message="no air", traceback="line 1", wall_time=1.0), {})
     run = list(store.runs())[2]
     assert (run.status, run.finished, run.message, run.traceback, run.path.exists()) == (status, False, "no air", "line 1", False)
     assert from_record(run.path.with_suffix(".json").read_bytes())["front"] is None
@@ -71,11 +71,11 @@ def test_what_failed_has_its_reason_and_no_front(store, status):
 
 def test_a_finished_run_leaves_neither_checkpoint_nor_samples_and_a_failed_one_both(store):
     run = next(store.runs())
-    checkpoint = store.checkpoint_path(run)
-    assert checkpoint == run.path.with_suffix(".checkpoint").absolute() and checkpoint.parent.is_dir()
+    checkpoint = store.checkpoint_path(run, "0a1b")
+    assert checkpoint == run.path.with_suffix(".0a1b.checkpoint").absolute() and checkpoint.parent.is_dir()
     for path in (checkpoint, samples_path(checkpoint)):
         path.write_bytes(b"half")
-    store.keep(run, RunOutcome("timeout"))
+    store.keep(run, RunOutcome("timeout"), {})
     assert checkpoint.exists() and samples_path(checkpoint).exists()
     finish(store)
     assert not checkpoint.exists() and not samples_path(checkpoint).exists()
@@ -196,7 +196,7 @@ def test_the_table_counts_each_cell_and_lists_the_first_twenty_reasons(tmp_path)
     with Store.claim(tmp_path, study(runs=11).definition()) as store:
         for count, last in ((20, "run 9 of"), (22, "and 2 more")):
             for run in list(store.runs())[:count]:
-                store.keep(run, RunOutcome("crashed"))
+                store.keep(run, RunOutcome("crashed"), {})
             lines = str(store.summary()).split("\n")
             large = next(line for line in lines if " large" in line).split()
             assert large[-4:] == ["0", str(count - 11), str(22 - count), "-"]

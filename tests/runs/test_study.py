@@ -160,7 +160,7 @@ def test_what_was_killed_or_late_is_made_again_and_what_crashed_if_asked(tmp_pat
     with Store.claim(tmp_path, batch.definition()) as store:
         runs = list(store.runs())
         for run, status in zip(runs, statuses[:-1], strict=False):
-            store.keep(run, RunOutcome(status))
+            store.keep(run, RunOutcome(status), {})
         runs[5].path.write_bytes(b"damaged")
 
     class Asked(Executor):

@@ -58,7 +58,7 @@ def test_run_resume_and_status(capsys):
 def test_status_says_what_is_wrong(capsys):
     study = Study.load("gliders.toml", trust=True)
     with Store.claim("out", study.definition()) as store:
-        store.keep(store.run(study.cells[0], 1), RunOutcome("killed", "its process was killed by SIGKILL"))
+        store.keep(store.run(study.cells[0], 1), RunOutcome("killed", "its process was killed by SIGKILL"), {})
     assert main(["study", "status", "out"]) == 1
     said = capsys.readouterr().out
     assert "0 of 2 runs finished" in said and "killed by SIGKILL" in said
