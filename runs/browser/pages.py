@@ -18,7 +18,7 @@ from ..batch.store import Store, StoredRun, StudySummary, median_time, reason
 from ..measures.attainment import attainment, band, staircase
 from ..measures.indicators import minimised, pieces, truth
 from ..measures.references import Reference
-from ..report.choices import only_choices
+from ..report.choices import only_single_points
 from ..report.comparison import AXES, Comparison, comparisons, histories, in_steps
 from ..report.published import with_count
 from ..report.report import tables_across, tables_of
@@ -120,7 +120,7 @@ def measured_data(comparison: Comparison, study: Mapping[str, Any]) -> dict[str,
     found: dict[str, Any] = {"tables": tables_data(tables_of(comparison, study))}
     if len(reference.front):
         found["reference"] = _reference_data(reference, comparison.known.goals)
-        if not only_choices(comparison):
+        if not only_single_points(comparison):
             found |= {"attainment": _attainment_data(comparison), "convergence": _convergence_data(comparison, reference)}
     return found
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from problems.compiled import Objective
 
-DECIDES = "Decide"
-"""The solver that chooses, by the name that cells record."""
+SINGLE = ("Decide", "Optimum", "Payoff")
+"""Solvers that return single points, and no front, by the names that cells record."""
 SIDE_BY_SIDE = 5
 """Most choices of one figure, of degrees or of flights: more would be too narrow on a page."""
 
@@ -66,9 +66,9 @@ def chosen(comparison: Comparison) -> list[RunChoice]:
     return found
 
 
-def only_choices(comparison: Comparison) -> bool:
-    """Whether all its solvers choose, so that there are no fronts to compare."""
-    return all(run.cell.details["solver"]["name"] == DECIDES for runs in comparison.runs.values() for run in runs)
+def only_single_points(comparison: Comparison) -> bool:
+    """Whether all its solvers return single points, so that there are no fronts to compare."""
+    return all(run.cell.details["solver"]["name"] in SINGLE for runs in comparison.runs.values() for run in runs)
 
 
 def choices_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:

@@ -22,7 +22,7 @@ from ..batch.store import Store
 from ..files import Flag, FurtherFigures, Text, check_trusted, checked, errors_begin_with
 from ..measures.attainment import attainment
 from ..measures.references import ReferenceKey, read, reference_addresses
-from .choices import choices_figures, choices_tables, only_choices
+from .choices import choices_figures, choices_tables, only_single_points
 from .comparison import AXES, CHARGED, Charge, Comparison, comparisons, histories, in_steps
 from .comparison_tables import claims_tables, cost_tables, indicator_tables
 from .flights import Flights, VariablesAlongFront
@@ -43,7 +43,7 @@ TABLES: Sequence[Callable[[Comparison, Mapping[str, Any]], dict[str, Table]]] = 
 )
 """The tables of each comparison: (comparison, definition of the study) -> {name of a file: table}. A new table is one more here."""
 OF_FRONTS = (indicator_tables,)
-"""Those left out where solvers choose single points, or there is nothing to compare."""
+"""Those left out where solvers return single points, or there is nothing to compare."""
 
 
 class ReportKeys(msgspec.Struct):
@@ -134,7 +134,7 @@ def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, 
 
 def tables_of(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
     """{name of a file: table} of a comparison, but that of the flights that stand for each front."""
-    compared = not comparison.against.alone and not only_choices(comparison)
+    compared = not comparison.against.alone and not only_single_points(comparison)
     kinds = [kind for kind in TABLES if compared or kind not in OF_FRONTS]
     return {name: one for kind in kinds for name, one in kind(comparison, study).items()}
 
@@ -182,7 +182,7 @@ def _figures(comparison: Comparison, further: Sequence[str]) -> dict[str, Figure
         found["means"] = front_figure(means, goals=[replace(goal, name=f"mean {goal.name}") for goal in comparison.known.goals])
     if len(comparison.known.goals) > 1:
         found["fronts"] = front_figure(comparison.fronts, goals=comparison.known.goals, reference=reference.front, truth_name=name)
-    if only_choices(comparison):
+    if only_single_points(comparison):
         return found
     if len(comparison.known.goals) == 2:
         surfaces = {solver: attainment(fronts) for solver, fronts in comparison.attaining().items()}

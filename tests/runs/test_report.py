@@ -10,7 +10,7 @@ from misbehaving import Crashing, Plain, glide
 from test_study import Inline
 
 from macs import Front
-from macs.gradient_solvers import Payoff
+from macs.gradient_solvers import Sweep
 from problems import Problem, load
 from runs import Study, gd, igd
 from runs.batch.store import Store
@@ -70,7 +70,7 @@ def told(folder) -> str:
 
 @pytest.mark.slow
 def test_of_a_solver_without_evaluations_there_are_histories_over_time_alone(tmp_path):
-    ours = study(solvers={"ends": Payoff(starts=1)}, runs=1, paper=[])
+    ours = study(solvers={"points": Sweep(points=3, starts=1)}, runs=2, paper=[])
     ours.run(tmp_path / "out", executor=Inline())
     ours.report(tmp_path / "out")
     names = {path.name for path in (tmp_path / "out" / "report").iterdir()}
