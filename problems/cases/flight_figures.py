@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 SAMPLES = 801
 """Of each phase."""
 RED = "#D55E00"
+POWERS = str.maketrans("23", "²³")
+"""Of units, as print has them."""
 
 
 def track(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -70,7 +72,7 @@ def _over_time(coloured: Sequence[tuple[Sequence[Any], Any]], along: Sequence[st
                 command = f"{name} command"
                 if command in phase.names and command not in along:
                     ax.plot(times, size * values[command], color=color, lw=0.5 * width, ls=(0, (4, 2)))
-        ax.set_title(f"{name} [{unit}]", loc="left", fontsize="small")
+        ax.set_title(f"{name} [{unit}]".translate(POWERS), loc="left", fontsize="small")
         ax.margins(x=0.0)
     for ax, limit in zip(grid[len(along) :], limits, strict=False):
         for bound in (limit.lower, limit.upper):
@@ -80,7 +82,7 @@ def _over_time(coloured: Sequence[tuple[Sequence[Any], Any]], along: Sequence[st
         ax.remove()
     for ax in grid[len(panels) - 3 : len(panels)]:
         ax.tick_params(labelbottom=True)
-    figure.supxlabel("time [s]")
+    figure.supxlabel("time [s]", fontsize="medium")
     return figure
 
 

@@ -91,7 +91,7 @@ def front_figure(
                 ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **look)
             if marked is not None:
                 _mark(ax, (minimised(marked, goals) * signs)[:, [i, j]], signs[[i, j]])
-            ax.set(xlabel=wrapped(better(goals[i]), room), ylabel=wrapped(better(goals[j]), room))
+            ax.set(xlabel=wrapped(better(goals[i]), room, 8.0), ylabel=wrapped(better(goals[j]), room, 8.0))
         for ax in grid[len(pairs) :]:
             ax.remove()
         legend(figure, grid[0])

@@ -240,7 +240,7 @@ def test_functions_are_drawn_over_ranges_and_a_little_beyond_with_points_on_them
         assert np.interp(at, x, y) == pytest.approx(heights) and np.diff(y) == pytest.approx(np.full(len(y) - 1, np.diff(y)[0]))
         assert (ax.get_yscale(), ax.lines[0].get_label()) == ("linear", "degree (1: best, 0: worst)")
     assert first.get_ylabel() == "degree (1: best, 0: worst)" and second.get_ylabel() == ""
-    assert (first.get_xlabel(), second.get_xlabel()) == ("← a [kg]", "b [m] →"), "arrows to what is better"
+    assert (first.get_xlabel(), second.get_xlabel()) == ("← a [kg]", "b [m]\N{NO-BREAK SPACE}→"), "arrows to what is better"
     assert first.figure.get_suptitle() == "weighted sum"
     figure = Figure()
     axes = EVEN.plot_functions(FRONT, RANGES, 1, figure)
@@ -252,7 +252,7 @@ def test_functions_are_drawn_over_ranges_and_a_little_beyond_with_points_on_them
     first, second = EVEN.plot_functions(FRONT)
     assert first.get_xlim() == pytest.approx((0.8, 5.2)) and second.get_xlim() == pytest.approx((7.6, 16.4))
     (only,) = FuzzyGoal({"b": 15.0}).plot_functions(FRONT, RANGES)
-    assert only.get_xlabel() == "b [m] →" and only.get_ylabel() == "membership"
+    assert only.get_xlabel() == "b [m]\N{NO-BREAK SPACE}→" and only.get_ylabel() == "membership"
     x, y = only.lines[0].get_data()
     assert np.interp([7.5, 15.0, 20.0], x, y) == pytest.approx([0.5, 1.0, 1.0], abs=1e-3)
 

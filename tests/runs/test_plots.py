@@ -33,7 +33,7 @@ def test_all_points_of_all_runs_and_the_truth(tmp_path):
     assert drawn["ours, 3 runs (1 empty)"].tolist() == [[1, 1], [3, 3], [2, 2.5]]
     assert drawn["theirs, 1 run"].tolist() == (A - [0, 0.5]).tolist()
     assert drawn["truth"] == pytest.approx(TRUTH)
-    assert ax.get_xlabel() == "← flight time [s]" and ax.get_ylabel() == "speed [km/s] →"
+    assert ax.get_xlabel() == "← flight time [s]" and ax.get_ylabel() == "speed [km/s]\N{NO-BREAK SPACE}→"
     assert [text.get_text() for text in ax.texts] == ["1"]
     figure.savefig(tmp_path / "fronts.pdf")
     assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()

@@ -130,7 +130,7 @@ def wrapped(text: str, width: float, size: float = 9.0) -> str:
 def better(goal: Objective) -> str:
     """Label of an axis with an arrow towards better values; on a vertical axis, left means down."""
     text = axis_label(goal.name, goal.unit)
-    return f"\N{LEFTWARDS ARROW} {text}" if goal.sense == "minimize" else f"{text} \N{RIGHTWARDS ARROW}"
+    return f"\N{LEFTWARDS ARROW} {text}" if goal.sense == "minimize" else f"{text}\N{NO-BREAK SPACE}\N{RIGHTWARDS ARROW}"
 
 
 def title_and_legend(ax: Any, title: str, columns: int = 3) -> None:

@@ -39,7 +39,7 @@ def test_every_front_can_be_drawn(front):
 
 def test_axes_have_units_and_senses_the_numbers_of_the_table_and_a_style_that_does_not_leak():
     ax = flights().plot()
-    assert ax.get_xlabel() == "\N{LEFTWARDS ARROW} time [s]" and ax.get_ylabel() == "height [km] \N{RIGHTWARDS ARROW}"
+    assert ax.get_xlabel() == "\N{LEFTWARDS ARROW} time [s]" and ax.get_ylabel() == "height [km]\N{NO-BREAK SPACE}\N{RIGHTWARDS ARROW}"
     assert "best height" in ax.get_legend().get_texts()[1].get_text()
     offsets = ax.collections[0].get_offsets()
     assert np.array_equal(offsets, flights().objectives)
