@@ -72,7 +72,7 @@ def _over_time(coloured: Sequence[tuple[Sequence[Any], Any]], along: Sequence[st
                 command = f"{name} command"
                 if command in phase.names and command not in along:
                     ax.plot(times, size * values[command], color=color, lw=0.5 * width, ls=(0, (4, 2)))
-        ax.set_title(f"{name} [{unit}]".translate(POWERS), loc="left", fontsize="small")
+        ax.set_title(f"{name} [{unit.translate(POWERS)}]", loc="left", fontsize="small")
         ax.margins(x=0.0)
     for ax, limit in zip(grid[len(along) :], limits, strict=False):
         for bound in (limit.lower, limit.upper):

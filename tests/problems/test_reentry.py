@@ -176,9 +176,9 @@ def test_pictures_show_states_limits_and_zones(case, flights, tmp_path):
     assert set(pictures) == {"population", "ground-track"}
     axes = pictures["population"].axes
     words = [ax.get_title(loc="left") for ax in axes]
-    assert "altitude [km]" in words and "bank angle [deg]" in words and "heating rate [Btu/ft2/s]" in words
+    assert "altitude [km]" in words and "bank angle [deg]" in words and "heating rate [Btu/ft²/s]" in words
     assert axes[-1].get_ylabel() == "cross-range [deg]", "what the colours mean"
-    altitude, heating = axes[words.index("altitude [km]")], axes[words.index("heating rate [Btu/ft2/s]")]
+    altitude, heating = axes[words.index("altitude [km]")], axes[words.index("heating rate [Btu/ft²/s]")]
     assert altitude.lines[0].get_ydata()[[0, -1]] == pytest.approx([79.248, 25.0], abs=0.5)
     assert heating.lines[-1].get_ydata()[0] == (150.0 if case == "reentry_case2" else 200.0)
     track = pictures["ground-track"].axes[0]
