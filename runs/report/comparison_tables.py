@@ -65,7 +65,7 @@ def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[s
         scale = Scale.of(against.front, what=against.what).describe()
         title = f"{comparison.name}: against {against.what}"
         found[name] = summary_table(measured, caption=f"{title}.", notes=[scale])
-        if against is reference and len(measured["GD"]) > 1:
+        if against is reference and len(measured["GD"]) > 1 < max(map(len, measured["GD"].values())):  # of one run each nothing follows
             found["comparisons"] = pairs_table(measured, caption=f"{title}: solvers in pairs.")
             if len(measured["GD"]) > 2:
                 found["overall"] = overall_table(measured, caption=f"{title}: all solvers.")
