@@ -207,7 +207,7 @@ def test_nothing_to_report_on(tmp_path, capsys):
     assert "contains no study" in capsys.readouterr().err
     batch = study()
     with Store.claim(tmp_path / "out", batch.definition()) as store:
-        store.keep(store.run(store.cells[0], 1), RunOutcome("crashed", "it broke"))
+        store.keep(store.run(store.cells[0], 1), RunOutcome("crashed", "it broke"), {})
     with pytest.raises(ValueError, match="nothing to report on yet"):
         report(tmp_path / "out")
     with pytest.raises(ValueError, match="another study"):
