@@ -236,7 +236,8 @@ class Objectives(PublishedTable, tag="objectives"):
     def remark(self, comparison: Comparison) -> str:
         without = [solver for solver, fronts in comparison.fronts.items() if fronts and not any(map(len, fronts))]
         none = f" No run of {', '.join(without)} has a point that counts." if without else ""
-        return f"over the points of all runs; deviation and variance with divisor n - 1.{none}"
+        spread = {row[STATISTIC] for row in self.rows} & {"standard deviation", "variance"}
+        return f"over the points of all runs{'; deviation and variance with divisor n - 1' if spread else ''}.{none}"
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         if len(self.heads) < len(self.measures):
