@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from runs.bench import BENCHES, sources
+from runs.bench import BENCHES
 from runs.bench.contract import Row
 from runs.cli import main
 from runs.report.page import PageHeader, digest
@@ -31,12 +31,10 @@ def test_every_page_has_a_header_and_a_command_that_exists(page):
 
 
 def test_every_benchmark_is_of_files():
-    for kind in BENCHES:
-        files = sources(kind)
+    for files in (one.sources for one in BENCHES.values()):
         assert len(files) > 1 and all(file.is_file() for file in files) and len(set(files)) == len(files)
-    assert any(file.name == "functions.py" for file in sources("uf")) and sources("study")[0].name == "study.py"
-    with pytest.raises(ValueError, match="no benchmark 'none'"):
-        sources("none")
+    assert any(file.name == "functions.py" for file in BENCHES["uf"].sources) and BENCHES["study"].sources[0].name == "study.py"
+    assert "macs.search.macs" in BENCHES["uf"].code and "macs.gradient_tools" in BENCHES["peers"].code
 
 
 def stub(monkeypatch, ends: BaseException | None = None) -> None:
@@ -66,7 +64,7 @@ def test_a_page_of_a_benchmark(tmp_path, monkeypatch, capsys):
     page = made(tmp_path, monkeypatch)
     text = page.read_text()
     header = PageHeader.read(text)
-    assert header.command == f"macs bench population --quick --page {page}" and header.digest == digest(*sources("population"))
+    assert header.command == f"macs bench population --quick --page {page}" and header.digest == digest(*BENCHES["population"].sources)
     assert "POPULATIONS" in text and "at least 4 times as fast" in text and text.count("```") == 2
     assert "POPULATIONS" in capsys.readouterr().out
     assert make.main(["--check"], tmp_path) == 0
@@ -80,8 +78,8 @@ def test_a_page_of_a_benchmark(tmp_path, monkeypatch, capsys):
     ("old", "new", "words"),
     [
         ("digest: ", "digest: 0", "OUT OF DATE: what states it"),
-        ("version: ", "code: macs.search 0\nversion: ", "OUT OF DATE: macs.search"),
-        ("macs bench population", "macs bench populations", "there is no"),
+        ("code: ", "code: macs.none 0, ", "OUT OF DATE: macs.none"),
+        ("macs bench population", "macs bench populations", "makes no page"),
         ("macs bench population", "macs list", "there is no command"),
         ("--page", "--csv", "makes no page"),
         ("<!-- made by", "made by", "does not begin"),

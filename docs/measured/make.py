@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from runs.batch.code import code_of_measures, merged
-from runs.bench import BENCHES, sources
+from runs.bench import BENCHES
 from runs.bench.contest import CONTESTS
 from runs.cli.parser import build_parser
 from runs.report.page import digest, print_standing, standing
@@ -52,8 +52,8 @@ def files_of(command: str) -> list[Path]:
         arguments = build_parser().parse_args(words)
     except SystemExit:
         raise ValueError(f"there is no command '{command}'") from None
-    if program == "macs" and arguments.command == "bench" and arguments.what and arguments.page:
-        return sources(arguments.what)
+    if program == "macs" and arguments.command == "bench" and arguments.what in BENCHES and arguments.page:
+        return BENCHES[arguments.what].sources
     if program == "macs" and arguments.command == "study" and arguments.action == "report":
         return [STUDIES / f"{Path(arguments.folder).name}.toml"]
     raise ValueError(f"'{command}' makes no page")

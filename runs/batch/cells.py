@@ -177,13 +177,7 @@ def written(start: Any) -> Any:
 
 
 def combine(
-    problems: Any,
-    transcriptions: Any,
-    solvers: Any,
-    evaluations: Any,
-    terms: Mapping[str, Mapping[str, Any]],
-    inner: str | None,
-    start: Any,
+    problems: Any, transcriptions: Any, solvers: Any, evaluations: Any, terms: Mapping[str, Any], inner: str | None, start: Any
 ) -> tuple[list[tuple[Cell, Payload, Modules]], dict[str, CompiledProblem | CompiledVectorProblem], dict[str, Solver]]:
     """The cells, problems first, each with its problem, transcription and solver pickled for the processes that run them, and the modules
     of these; and the problems and solvers by label.

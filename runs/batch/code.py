@@ -15,11 +15,8 @@ FLOORS = Path(__file__).parents[2]
 """The folder of the packages."""
 SOLVING = ("problems", "transcription", "macs")
 """Those whose code decides a result; what `runs` measures of it can be measured again."""
-SHOWING = (
-    *("macs.fronts.pictures", "macs.fronts.tables", "macs.fronts.spreadsheets", "macs.preferences.pictures"),
-    *("macs.io.console", "macs.io.text", "macs.solvers.progress"),
-    *("macs.fronts.files", "macs.fronts.dataset", "macs.fronts.columns", "macs.io.netcdf", "macs.io.atomic"),
-)
+SHOWING = [f"macs.fronts.{one}" for one in ("pictures", "tables", "spreadsheets", "files", "dataset", "columns")]
+SHOWING += [f"macs.{one}" for one in ("preferences.pictures", "solvers.progress", "io.console", "io.text", "io.netcdf", "io.atomic")]
 """Modules that only show or store a result."""
 NAMING = ("problems.catalogue", "transcription.catalogue")
 """Modules that find others by a name: which these are, a study's cells say."""
@@ -58,9 +55,9 @@ def code_of_method(problem: str, transcription: str, solver: str) -> Code:
     return code_of(seeds, [*([] if flying else ["transcription"]), *(BY_GRADIENTS if by_values else [])])
 
 
-def imported(modules: Collection[str]) -> list[str]:
-    """The modules of the floors below that these import, of those in `runs`."""
-    return [_defining(*one) for module in modules if module.startswith("runs.") for one in _imports(_path(module))]
+def imported(files: Sequence[Path]) -> list[str]:
+    """The modules of the floors below that files of `runs` import."""
+    return [_defining(*one) for file in files if file.is_relative_to(FLOORS / "runs") for one in _imports(file)]
 
 
 def code_of_measures() -> dict[str, str]:

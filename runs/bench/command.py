@@ -6,8 +6,6 @@ import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from macs.io.atomic import write_whole
@@ -103,29 +101,14 @@ def _measure(one: Bench, rows: list[Row], effort: Any) -> bool:
     return False
 
 
-def sources(kind: str) -> list[Path]:
-    """The files that state what a benchmark measures, in a fixed order; the search itself is none of them, see `Bench.code`.
-
-    Raises ValueError if there is no such benchmark.
-    """
-    if kind not in BENCHES:
-        raise ValueError(f"there is no benchmark '{kind}'")
-    return BENCHES[kind].sources
-
-
 def header_of(
-    kind: str,
-    page: str | PathLike[str],
-    *,
-    quick: bool = False,
-    seeds: int | None = None,
-    jobs: int = 1,
-    keep: str | None = None,
-    solvers: Sequence[str] = (),
+    kind: str, page: str, *, quick: bool = False, seeds: int | None = None, jobs: int = 1, keep: Any = None, solvers: Sequence[str] = ()
 ) -> PageHeader:
     """The header of the page of a benchmark. Raises ValueError if it cannot be written into a comment."""
     words = ["--quick"] if quick else []
     words += ["--seeds", str(seeds)] if seeds else []
     words += ["--jobs", str(jobs)] if jobs > 1 else []
     words += ["--solvers", *solvers] if solvers else []
-    return PageHeader.now(shlex.join(["macs", "bench", kind, *words, "--page", str(page)]), digest(*sources(kind)), BENCHES[kind].code)
+    return PageHeader.now(
+        shlex.join(["macs", "bench", kind, *words, "--page", str(page)]), digest(*BENCHES[kind].sources), BENCHES[kind].code
+    )

@@ -153,18 +153,14 @@ class Bench:
     @property
     def sources(self) -> list[Path]:
         """The files that state what is measured."""
-        return [*(Path(inspect.getfile(module)) for module in self._modules), Path(__file__)]
+        own = inspect.getfile(self.prepare or self.whole)  # type: ignore[arg-type]
+        return [Path(own), *(Path(str(module.__file__)) for module in self.modules), Path(__file__)]
 
     @property
     def code(self) -> dict[str, str]:
         """The code that what is measured depends on, see `batch.code`."""
-        names = [module.__name__ for module in self._modules]
         searches = [code_of_method("", "", SOLVERS[name].partition(":")[0]) for name in ("macs", "nsga2")]
-        return merged(searches) if self.kept else code_of(imported(names))
-
-    @property
-    def _modules(self) -> list[Any]:
-        return [inspect.getmodule(self.prepare or self.whole), *self.modules]
+        return merged(searches) if self.kept else code_of(imported(self.sources))
 
 
 def merge(rows: list[Row], found: Iterable[Row]) -> None:

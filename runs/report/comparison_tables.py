@@ -93,6 +93,32 @@ def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, T
     return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.", notes)}
 
 
+def runs_table(found: Sequence[Comparison]) -> Table:
+    """A row for each finished run of some comparisons: its costs, the number of its points that count, and its indicators."""
+    rows: list[list[Cell]] = []
+    for comparison in found:
+        measured = samples(comparison, comparison.against) if len(comparison.against.front) else {}
+        for solver, runs in comparison.runs.items():
+            for i, run in enumerate(runs):
+                stats, cpu, points = run.front.stats, run.history.get("cpu") or [None], len(comparison.fronts[solver][i])
+                costs = [stats["evaluations"], stats["gradient_solves"], cpu[-1], run.wall_time]
+                values = [measured[name][solver][i] if measured else None for name in ("GD", "IGD", "hypervolume")]
+                rows.append([comparison.shown, comparison.transcription, solver, run.number, *costs, points, *values])
+    heads: list[Head | str] = [*(Head(name, grouped=True) for name in ("problem", "transcription")), "solver", "run"]
+    heads += ["evaluations", "gradient solves", Head("processor", "s"), Head("time", "s"), "points", "GD", "IGD", "hypervolume"]
+    return table(heads, rows)
+
+
+def medians_table(runs: Table) -> Table:
+    """The medians of the runs of each solver, from a table of all."""
+    rows: list[list[Cell]] = []
+    for key in dict.fromkeys(row[:3] for row in runs.rows):
+        columns = np.array([row[4:] for row in runs.rows if row[:3] == key], dtype=float).T
+        rows.append([*key, columns.shape[1], *(_median([column]) for column in columns)])
+    note = "Points that count. GD and IGD: less is better, hypervolume: more, by the reference that is named below."
+    return table([*runs.columns[:3], "runs", *runs.columns[4:]], rows, "Medians of a run.", [note])
+
+
 Samples = Mapping[str, Mapping[str, Sequence[float] | np.ndarray]]
 """Indicator -> solver -> one value for each run; NaN or infinite where a run failed."""
 

@@ -23,11 +23,14 @@ from macs.io.text import counted, duration
 from ..batch.code import SEVERAL, UNKNOWN, Code, changed, code_of_measures, merged, rooms
 from ..batch.store import Store, StudySummary
 from ..files import DATA_BYTES
+from .comparison_tables import medians_table, runs_table
 from .published import with_count
 from .tables import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from .comparison import Comparison
 
 OPENS, CLOSES = "<!-- ", " -->"
 """Of a comment, which a page as it is shown does not have."""
@@ -119,6 +122,8 @@ def print_standing(pages: Iterable[Path], now: Now) -> bool:
     return all(good for _, good in found.values())
 
 
+MOST_ROWS = 12
+"""Of a table that is not folded."""
 PICTURES = ("fronts", "hypervolume-over-charged-evaluations")
 """Ends of the names of the figures on a page."""
 
@@ -132,7 +137,10 @@ class Page:
             raise ValueError(f"a page is a file .md, not '{path}'")
         check_target(self.path)
         self._command, self._digest, self._definition = command, digest(file), dict(definition)
+        self._first: list[str] = []
         self._parts: list[str] = []
+        self._folded: list[str] = []
+        self._data = b""
         self._pictures: dict[str, bytes] = {}
 
     def check(self, store: Store) -> None:
@@ -150,15 +158,22 @@ class Page:
         if left:
             raise ValueError(f"page: {counted(len(left), 'run')} of '{store.path}' not finished; a page has all of them")
 
-    def heading(self, title: str, lines: Sequence[str]) -> None:
-        """Begin a part."""
-        self._parts += [f"## {title}\n", *(f"{line}\n" for line in lines)]
+    def measured(self, found: Sequence[Comparison]) -> None:
+        """Add the medians of all runs to what comes first; the data beside the page are a row for each run."""
+        runs = runs_table(found)
+        self._data = runs.csv().encode()
+        self._first.append(medians_table(runs).markdown())
 
-    def table(self, one: Table) -> None:
-        """Add a table; a long one is folded."""
-        text = one.markdown()
-        folded = f"<details><summary>{one.caption or 'Table'}</summary>\n\n{text}\n</details>\n"
-        self._parts.append(folded if len(one.rows) > 40 else text)
+    def heading(self, title: str, lines: Sequence[str]) -> None:
+        """Begin a part; what is folded stands below the figures of the one before."""
+        self._parts += [*self._folded, f"## {title}\n", *(f"{line}\n" for line in lines)]
+        self._folded.clear()
+
+    def table(self, one: Table, first: bool = False) -> None:
+        """Add a table, to what comes first or where it is; there a long one is folded."""
+        text, folded = one.markdown(), len(one.rows) > MOST_ROWS and not first
+        place = self._first if first else self._folded if folded else self._parts
+        place.append(f"<details><summary>{one.caption or 'Table'}</summary>\n\n{text}\n</details>\n" if folded else text)
 
     def figure(self, name: str, figure: Figure) -> None:
         """Add a figure, if it is of those on pages."""
@@ -188,9 +203,10 @@ class Page:
             f"{study['description']}\n",
             *([f"{with_count(study['note'], study)}\n"] if study["note"] else []),
         ]
-        text = "\n".join([*texts, f"{made}\n", *self._parts])
+        text = "\n".join([*texts, *self._first, f"{made} Data of all runs: [CSV]({self.path.stem}.csv).\n", *self._parts, *self._folded])
         folder = self.path.parent
         written = {self.path: text.encode(), **{folder / name: content for name, content in self._pictures.items()}}
+        written[self.path.with_suffix(".csv")] = self._data
         for path, content in written.items():
             write_whole(path, content)
         return list(written)
@@ -204,9 +220,8 @@ def _of_several(code: Code) -> str:
 
 def _machine() -> str:
     """The machine in words: its processor, their number and its system."""
-    name = platform.processor() or platform.machine()
-    information = Path("/proc/cpuinfo")
-    if information.exists():  # on Linux alone
-        names = [line.partition(":")[2].strip() for line in information.read_text().splitlines() if line.startswith("model name")]
-        name = names[0] if names else name
+    information = Path("/proc/cpuinfo")  # on Linux alone
+    lines = information.read_text().splitlines() if information.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    name = [*names, platform.processor() or platform.machine()][0]
     return f"{counted(os.cpu_count() or 1, 'processor')} ({name}), {platform.system()}"

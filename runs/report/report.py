@@ -105,10 +105,11 @@ def report(
         sections += [writer.table(name, one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
             writer.figure(name, figure)
-    sections += [writer.table(name, one) for name, one in published_tables(found, study).items()]
+    sections += [writer.table(name, one, first=True) for name, one in published_tables(found, study).items()]
     text = "\n\n".join(sections)
     writer.write("report.txt", text.encode() + b"\n")
     if page is not None:
+        page.measured(found)
         writer.files += page.save(summary, study)
     return Report(text, tuple(writer.files))
 
@@ -217,10 +218,10 @@ class _Writer:
         self._folder, self._page, self.files = folder, page, list[Path]()
         self._used: Counter[tuple[str, str]] = Counter()
 
-    def table(self, name: str, one: Table) -> str:
-        """Write a table in its three forms; returns its text."""
+    def table(self, name: str, one: Table, first: bool = False) -> str:
+        """Write a table in its three forms, on the page among what comes first if it is to be; returns its text."""
         if self._page is not None:
-            self._page.table(one)
+            self._page.table(one, first)
         self.files += one.save(self._folder / self._free("table", name))
         return one.text()
 
