@@ -1,5 +1,6 @@
 """Pages of measured results, their headers, and what only verified points and counted work may decide in reports."""
 
+import csv
 import hashlib
 import shutil
 from dataclasses import replace
@@ -59,6 +60,12 @@ def test_a_page_has_tables_pictures_and_where_they_are_from(place, capsys):
     assert header.command == f"macs study report {place / 'out'} --page {place / 'small.md'} --study {place / 'small.toml'}"
     for words in ("# small", "A small study", "Of no use but here.", "6 runs", "casadi", "## goddard, dfet:2x3", "| indicator | solver |"):
         assert words in text, words
+    before, _, after = text.partition("## goddard")
+    assert "**Medians of a run.**" in before and "<details>" not in before and after.index("![") < after.index("<details>")
+    assert "more than one code" not in text and "transcription.elements" in header.code and "runs.measures" in header.code
+    rows = list(csv.DictReader((place / "small.csv").read_text().splitlines()))
+    assert len(rows) == 6 and {row["run"] for row in rows} == {"1", "2"} and all(float(row["evaluations"]) == 100 for row in rows)
+    assert all(float(row["IGD"]) >= 0 and float(row["time [s]"]) > 0 for row in rows) and "[CSV](small.csv)" in text
     pictures = [line.split("](")[1].rstrip(")") for line in text.splitlines() if line.startswith("![")]
     assert len(pictures) == 2 and all((place / one).read_bytes().startswith(b"\x89PNG") for one in pictures)
 
