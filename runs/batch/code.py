@@ -1,7 +1,5 @@
-"""The code that a result depends on: digests of the modules that it may run, found by what each imports.
-
-Comments, docstrings and formatting are no code. A name that a package only passes on is followed to the module that defines it.
-"""
+"""The code that a result depends on: digests of the modules that it may run, found by what each imports. Comments, docstrings and
+formatting are no code. A name that a package only passes on is followed to the module that defines it."""
 
 from __future__ import annotations
 
