@@ -22,9 +22,6 @@ BY_GRADIENTS = ("macs.gradients", "macs.refinement", "macs.gradient_tools")
 """What calls and fronts can do, but baselines on a given transcription, and searches without one, never do."""
 UNKNOWN, SEVERAL = "unknown", "+"
 """In place of a module and its digest where no code was recorded; between several digests of one module."""
-DIGITS = 8
-"""Of a digest of a module, hexadecimal."""
-
 Code = Mapping[str, str]
 """{module: digest of its code}."""
 
@@ -75,7 +72,7 @@ def merged(several: Iterable[Code]) -> dict[str, str]:
 
 def digest_of_code(code: Code) -> str:
     """One digest of all modules; empty for none, of which nothing is known."""
-    return hashlib.sha256(repr(sorted(code.items())).encode()).hexdigest()[:DIGITS] if code else ""
+    return _short(repr(sorted(code.items()))) if code else ""
 
 
 def rooms(code: Code) -> dict[str, str]:
@@ -94,7 +91,11 @@ def changed(one: Code, other: Code) -> list[str]:
 
 @cache
 def _digest(path: Path) -> str:
-    return hashlib.sha256(" ".join(_words(_tree(path))).encode()).hexdigest()[:DIGITS]
+    return _short(" ".join(_words(_tree(path))))
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
 @cache

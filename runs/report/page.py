@@ -219,6 +219,5 @@ def _machine() -> str:
     """The machine in words: its processor, their number and its system."""
     information = Path("/proc/cpuinfo")  # on Linux alone
     lines = information.read_text().splitlines() if information.exists() else []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    name = [*names, platform.processor() or platform.machine()][0]
-    return f"{counted(os.cpu_count() or 1, 'processor')} ({name}), {platform.system()}"
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")] or [platform.processor()]
+    return f"{counted(os.cpu_count() or 1, 'processor')} ({names[0] or platform.machine()}), {platform.system()}"
