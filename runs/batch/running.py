@@ -184,8 +184,8 @@ def execute(
     if older and fresh:
         every = [replace(run, status=MISSING) if run in older else run for run in every]
     elif older:
-        names = sorted({name for run in older for name in (changed(run.code, code_of(run.cell)) if run.code else [UNKNOWN])})
-        what = store.path, len(older), len(every), ", ".join(names[:5])
+        names = {name for run in older for name in (changed(run.code, code_of(run.cell)) if run.code else [UNKNOWN])}
+        what = store.path, len(older), len(every), ", ".join(sorted(names)[:5])
         log.warning("%s: %d of %d runs are by other code (%s, ...); they stay: `--fresh`, fresh=True, makes them again", *what)
     todo = [run for run in every if run.status in AGAIN or (retry and run.status == CRASHED)]
     if not todo:

@@ -119,8 +119,6 @@ def print_standing(pages: Iterable[Path], now: Now) -> bool:
     return all(good for _, good in found.values())
 
 
-MOST_ROWS = 12
-"""Of a table that is not folded."""
 PICTURES = ("fronts", "hypervolume-over-charged-evaluations")
 """Ends of the names of the figures on a page."""
 
@@ -168,7 +166,7 @@ class Page:
 
     def table(self, one: Table, first: bool = False) -> None:
         """Add a table, to what comes first or where it is; there a long one is folded."""
-        text, folded = one.markdown(), len(one.rows) > MOST_ROWS and not first
+        text, folded = one.markdown(), len(one.rows) > 12 and not first
         place = self._first if first else self._folded if folded else self._parts
         place.append(f"<details><summary>{one.caption or 'Table'}</summary>\n\n{text}\n</details>\n" if folded else text)
 
