@@ -84,6 +84,10 @@ class Dispersions:
         for name, least in (("cases", 1), ("seed", 0)):
             checks.check_count(f"dispersions: {name}", getattr(self, name), least)
 
+    def __str__(self) -> str:
+        shares = f"{self.density:.3g} of the density, {self.ballistic:.3g} of the ballistic coefficient"
+        return f"{self.cases:,} cases by seed {self.seed}, {self.entry_angle:g} deg of the entry angle, {shares}"
+
     def draw(self) -> Cases:
         """The cases, the same for all designs: differences between these are then not those of the draws."""
         normal = np.random.default_rng(self.seed).standard_normal((3, self.cases))
