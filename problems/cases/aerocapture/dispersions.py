@@ -85,7 +85,7 @@ class Dispersions:
             checks.check_count(f"dispersions: {name}", getattr(self, name), least)
 
     def __str__(self) -> str:
-        shares = f"{self.density:.3g} of the density, {self.ballistic:.3g} of the ballistic coefficient"
+        shares = f"{100 * self.density:.3g} % of the density, {100 * self.ballistic:.3g} % of the ballistic coefficient"
         return f"{self.cases:,} cases by seed {self.seed}, {self.entry_angle:g} deg of the entry angle, {shares}"
 
     def draw(self) -> Cases:
