@@ -38,11 +38,6 @@ Law = Mapping[str, np.ndarray]
 LAW_LOOK: Mapping[str, Any] = {"color": "black", "lw": 0.9, "ls": (0, (4, 2))}
 
 
-def _nothing(states: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
-    """What is derived of states where a case says nothing."""
-    return {}
-
-
 def representatives(front: Front, count: int = 4) -> list[int]:
     """Numbers of `count` converged points that stand for a front: the best of each objective, and others spread evenly between them."""
     good = np.flatnonzero(front.status == CONVERGED)
@@ -96,7 +91,7 @@ class Flights:
         law: Callable[[float], Law] | None = getattr(self.case, "optimal_flight", None)
         laws = [law(float(point.trajectory.phases[-1].time[-1])) if law and point.trajectory else None for point in self.points]
         name, track = getattr(self.case, "LAW", "known law"), getattr(self.case, "track", None)
-        derived = getattr(self.case, "derived", _nothing)
+        derived: Derived | None = getattr(self.case, "derived", None)
         found = {"flights": flights_figure(self.points, laws=laws, law_name=name, solver=self.solver, derived=derived)}
         if track is not None:
             found["paths"] = paths_figure(self.points, track, laws=laws, law_name=name)
@@ -176,7 +171,7 @@ def flights_figure(
     law_name: str = "",
     solver: str = "",
     names: Sequence[str] = (),
-    derived: Derived = _nothing,
+    derived: Derived | None = None,
 ) -> Figure:
     """A column for each point, a row for each state, what is derived of them, and each control over time, with the optimal law of each as a
     dashed line where there is one; the point's number, from 1, and its objectives above."""
@@ -192,7 +187,7 @@ def flights_figure(
         figure = new_figure(PAGE, 1.0 * len(rows) + 0.75)
         grid = figure.subplots(len(rows), len(points), squeeze=False, sharex="col", sharey="row")
         for column, (point, phases, law) in enumerate(zip(points, lines_of, laws or [None] * len(points), strict=True)):
-            known = None if law is None else {**law, **derived(law)}
+            known = None if law is None else {**law, **(derived(law) if derived else {})}
             for ax, name in zip(grid[:, column], rows, strict=True):
                 for k, found in enumerate(phases):
                     if name in found:
@@ -228,8 +223,8 @@ def paths_figure(points: Sequence[Point], track: Derived, *, laws: Sequence[Law 
         for number, (point, color) in enumerate(zip(points, COLORS, strict=False), 1):
             for k, phase in enumerate(point.trajectory.phases if point.trajectory is not None else ()):
                 labels, places = zip(*track({name: values for name, (_, values) in _lines(phase).items()}).items(), strict=True)
-                order = 3.0 - 0.1 * number  # the first above those that go on
-                ax.plot(*places, color=color, lw=1.8, zorder=order, label=None if k else f"point {number}")
+                # The first above those that go on.
+                ax.plot(*places, color=color, lw=1.8, zorder=3.0 - 0.1 * number, label=None if k else f"point {number}")
                 ax.plot(*(values[np.isfinite(values)][-1:] for values in places), "o", color=color, ms=3.5, zorder=4)
         for law in filter(None, laws):
             ax.plot(*track(law).values(), **LAW_LOOK, zorder=3, label=law_name if law is laws[0] else None)
@@ -241,12 +236,12 @@ def paths_figure(points: Sequence[Point], track: Derived, *, laws: Sequence[Law 
     return figure
 
 
-def _lines(phase: PhaseTrajectory, derived: Derived = _nothing) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _lines(phase: PhaseTrajectory, derived: Derived | None = None) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """{name: times and values} of states, controls and what is derived of states, along every element."""
     found = {one.name: along(phase, one.name) for one in (*phase.state_variables, *phase.control_variables)}
     times = found[phase.state_variables[0].name][0]
     states = {one.name: found[one.name][1] for one in phase.state_variables}
-    return found | {name: (times, values) for name, values in derived(states).items()}
+    return found | {name: (times, values) for name, values in (derived(states) if derived else {}).items()}
 
 
 def _title(name: str, point: Point, width: int) -> str:
