@@ -168,7 +168,7 @@ class StageSolver:
         about = costs(Counts(), wall_time=0.0, seed=None, tolerance=self.solves.tolerance, reproducible=True)
         point = from_vectors(nlp, z[None], {"name": "decide"}, about, status=[CONVERGED], notes=[note], **certified(nlp, z[None], None))
         found = resolve_unverified(point if among is None else unmarked(Points.concatenate([point, among])), verify)
-        spent = {key: found.stats[key] for key in ("inner_iterations", "work", "gradient_work")}
+        spent = {key: found.stats[key] for key in ("inner_iterations", "work", "charge")}
         spent |= {key: Counter(found.stats[key]) for key in COUNTED_BY}
         self.solves.counts = self.solves.counts.joined(Counts(**spent, clocked=int(not found.stats["reproducible"])))
         first, method = found[0], from_dict(found[0].transcription or {})

@@ -11,6 +11,7 @@ from problems.compiled import Objective
 from problems.sampling import refuse_peaks
 from transcription.base import NLP
 from transcription.inner import InnerSolver
+from transcription.inner.base import batch_charge, solves_charge, spent
 from transcription.nlp.derivatives import refuse_dense
 from transcription.nlp.scalarized import Solved, scalarize
 from transcription.smooth import Smooth
@@ -75,7 +76,9 @@ class Bilevel(Evaluator):
 
     def _evaluate(self, Z: np.ndarray, way: int | None = None) -> tuple[Evaluation, int]:
         inner = self.inner if way is None else self.inner.ways[way]
+        before = spent(self.nlp)
         found = inner.solve(self.nlp, Z[:, self.free], Z, tolerance=self.tolerance)
+        charge = spent(self.nlp) - before + batch_charge(self.nlp, len(Z))
 
         def itemise() -> np.ndarray:
             return self.nlp.by_constraint(self.nlp.residuals(found.z)[1] if found.residuals is None else found.residuals)
@@ -89,6 +92,7 @@ class Bilevel(Evaluator):
             clocked=found.clocked,
             fallbacks=found.fallbacks,
             work=round((iterations if found.work is None else found.work) * Z.shape[1]),
+            charge=charge,
             itemise=itemise,
         )
         return evaluation, iterations
@@ -107,5 +111,6 @@ class Bilevel(Evaluator):
             violation=np.array([solved.violation for solved in found]),
             status=np.array([solved.status for solved in found], dtype="<U10"),
             clocked=any(solved.clocked for solved in found),
+            charge=solves_charge(self.nlp, len(found), sum(solved.iterations for solved in found)),
         )
         return evaluation, sum(solved.iterations for solved in found)

@@ -158,7 +158,7 @@ class Evaluation:
         Whether a time limit ended any of the work: then the same vectors may give other results next time.
     fallbacks : int
         Number of vectors that the fast inner level passed to the slow one.
-    work : int
+    work, charge : int
         What the evaluation took; see `Counts`.
     itemise : callable, optional
         Function that returns `violations`; called only when they are needed.
@@ -182,6 +182,7 @@ class Evaluation:
     clocked: bool = False
     fallbacks: int = 0
     work: int = 0
+    charge: int = 0
     itemise: Callable[[], np.ndarray] | None = field(default=None, repr=False, compare=False)
     residuals: np.ndarray | None = field(default=None, repr=False, compare=False)
 
@@ -222,7 +223,9 @@ class Counts:
     # Iterations of IPOPT times variables of its program, or what takes about as long: the same on all machines, and comparable for
     # programs of all sizes. Plain functions take none.
     work: int = 0
-    gradient_work: int = 0  # part of the work that gradient solves took
+    charge: int = (
+        0  # nanoseconds of one processor that all of it takes there, by counts: the same on all machines, see `inner.base.Charges`
+    )
     solved: int = 0  # gradient solves that converged, each by itself or all of a batch, and their iterations
     solved_iterations: int = 0
     # By what they were for, see `spending`: gradient solves, their iterations, and those that gave a new point or a better one.
@@ -239,16 +242,16 @@ class Counts:
         """Number of gradient solves."""
         return sum(self.solves_for.values())
 
-    def add_solves(self, count: int, status: Sequence[str], iterations: int, clocked: int, variables: int) -> None:
-        """Count gradient solves with their statuses and iterations, of programs with so many variables; `clocked` of them were ended early
-        by a time limit."""
+    def add_solves(self, count: int, status: Sequence[str], iterations: int, clocked: int, variables: int, charge: int = 0) -> None:
+        """Count gradient solves with their statuses, iterations and charge, of programs with so many variables; `clocked` of them were
+        ended early by a time limit."""
         self.solves_for += Counter({PURPOSE.get(): count})
         self.iterations_for += Counter({PURPOSE.get(): iterations})
         self.failures.update(one for one in status if one != CONVERGED)
         self.inner_iterations += iterations
         self.clocked += clocked
         self.work += iterations * variables
-        self.gradient_work += iterations * variables
+        self.charge += charge
         if all(one == CONVERGED for one in status):
             self.solved += count
             self.solved_iterations += iterations
@@ -385,6 +388,7 @@ class Evaluator(ABC):
         self.counts.clocked += evaluation.clocked
         self.counts.fallbacks += evaluation.fallbacks
         self.counts.work += evaluation.work
+        self.counts.charge += evaluation.charge
         self.counts.failures.update(status for status in evaluation.status.tolist() if status != CONVERGED)
         return evaluation
 
@@ -411,7 +415,7 @@ class Evaluator(ABC):
         self.before_batch()
         found, iterations = self._descend(starts, references, weights, margins)
         cut_short = found.clocked or len(found.F) < len(starts)
-        self.counts.add_solves(len(found.F), found.status.tolist(), iterations, cut_short, starts.shape[1])
+        self.counts.add_solves(len(found.F), found.status.tolist(), iterations, cut_short, starts.shape[1], found.charge)
         return found
 
     def _descend(

@@ -133,7 +133,7 @@ def _version(package: str) -> str:
         return "unknown"
 
 
-COUNTED = ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "work", "gradient_work")
+COUNTED = ("evaluations", "inner_iterations", "gradient_solves", "fallbacks", "work", "charge")
 """What `Counts` has that are entries of `stats`."""
 COUNTED_BY = ("solves_for", "iterations_for", "kept_for")  # the same, by what gradient solves were for
 
@@ -147,7 +147,7 @@ def costs(counts: Counts, **about: Any) -> dict[str, Any]:
 
 def more_costs(stats: Mapping[str, Any], counts: Counts, wall_time: float, stopped: str) -> dict[str, Any]:
     """`stats` of a front that was worked on further: counts and seconds are added, `stopped` says what ended the work early."""
-    added = ("gradient_solves", "inner_iterations", "work", "gradient_work")
+    added = ("gradient_solves", "inner_iterations", "work", "charge")
     return {
         **stats,
         **{key: stats.get(key, 0) + getattr(counts, key) for key in added},

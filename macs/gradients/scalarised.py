@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from transcription.base import NLP
+from transcription.inner.base import solves_charge
 from transcription.nlp.elastic import least_violation
 from transcription.nlp.optimality import Multipliers
 from transcription.nlp.scalarized import Solved, not_begun, scalarize
@@ -280,7 +281,8 @@ class GradientSolves:
         return self._counted(nlp, least_violation(nlp, start, tolerance=self.tolerance))
 
     def _counted(self, nlp: NLP, solved: Solved) -> Solved:
-        self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables))
+        charge = solves_charge(nlp, int(solved.begun), solved.iterations)
+        self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables), charge)
         return solved
 
     @contextmanager

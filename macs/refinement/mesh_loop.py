@@ -15,6 +15,7 @@ from problems.compiled import CompiledProblem, remembered
 from problems.sampling import objective_sizes, refuse_peaks
 from transcription.base import NLP, Transcription, kept_nlp
 from transcription.inner import Ipopt
+from transcription.inner.base import solves_charge
 from transcription.meshed import Meshed
 from transcription.meshes.errors import objective_variations
 from transcription.meshes.minimum import OptimumMultipliers
@@ -381,6 +382,7 @@ class MeshLoop:
         near = Ipopt().solve(nlp, start[None, nlp.free], start[None], tolerance=self.solves.tolerance)
         self.solves.counts.inner_iterations += int(near.iterations.sum())
         self.solves.counts.work += int(near.iterations.sum()) * len(nlp.variables)
+        self.solves.counts.charge += solves_charge(nlp, 1, int(near.iterations.sum()))
         self.solves.counts.clocked += near.clocked
         return Solved(near.z[0], near.F[0], float(near.violation[0]), str(near.status[0]), int(near.iterations[0])), False
 

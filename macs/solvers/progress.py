@@ -34,7 +34,7 @@ class Progress:
         Number of evaluations and gradient solves that did not converge, by status.
     F : array (archive, m)
         Objectives of the points in the archive, all minimised; available at no cost, unlike `front`.
-    inner_iterations, gradient_solves, work, gradient_work : int
+    inner_iterations, gradient_solves, work, charge : int
         See `Counts`.
 
     Examples
@@ -58,7 +58,7 @@ class Progress:
     inner_iterations: int = 0
     gradient_solves: int = 0
     work: int = 0
-    gradient_work: int = 0
+    charge: int = 0
 
     @property
     def front(self) -> Front:

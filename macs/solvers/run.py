@@ -208,5 +208,5 @@ class SearchRun:
             inner_iterations=counts.inner_iterations,
             gradient_solves=counts.gradient_solves,
             work=counts.work,
-            gradient_work=counts.gradient_work,
+            charge=counts.charge,
         )

@@ -185,7 +185,7 @@ def _unpacked(payload: bytes) -> tuple[Any, Any]:
 
 # Samples
 
-COUNTS = ("evaluations", "inner_iterations", "gradient_solves", "work", "gradient_work")
+COUNTS = ("evaluations", "inner_iterations", "gradient_solves", "work", "charge")
 Report = Callable[[int, float], Any]
 """Called at intervals with the evaluations and seconds so far."""
 
@@ -193,15 +193,16 @@ Report = Callable[[int, float], Any]
 class History(TypedDict, total=False):
     """How a run converged, by columns with an entry for each sample; empty if it is not known.
 
-    Keys are its costs so far, "elapsed" seconds, and "F": the objectives (k, m) of its archive, all minimised.
+    Keys are its costs so far, "elapsed" seconds, "cpu" of the processor, and "F": the objectives (k, m) of its archive, all minimised.
     """
 
     evaluations: list[int]
     inner_iterations: list[int]
     gradient_solves: list[int]
     work: list[int]
-    gradient_work: list[int]
+    charge: list[int]
     elapsed: list[float]
+    cpu: list[float]
     F: list[list[list[float]]]
 
 
@@ -213,6 +214,7 @@ class ArchiveSamples:
         self._step = max(1, (budget or PLANNED_EVALUATIONS) // 30)
         self._next, self._report, self._told, self._path = 0, report, 0.0, path
         self.columns: dict[str, list[Any]] = {key: [] for key in History.__annotations__}
+        self._began = time.process_time()  # less what a run that is resumed had taken before
         self._before, self._unsaved = _read(path), False
 
     def note(self, progress: Any) -> None:
@@ -234,6 +236,7 @@ class ArchiveSamples:
         for key in COUNTS:
             self.columns[key].append(int(counts.get(key, 0)))
         self.columns["elapsed"].append(float(elapsed))
+        self.columns["cpu"].append(time.process_time() - self._began)
         self.columns["F"].append(F.tolist())
 
     def _resume(self, evaluations: int) -> None:
@@ -243,6 +246,7 @@ class ArchiveSamples:
         count = sum(before < evaluations for before in self._before["evaluations"])
         self.columns, self._before = {key: self._before[key][:count] for key in self.columns}, None
         if count:
+            self._began -= self.columns["cpu"][-1]
             self._next = (self.columns["evaluations"][-1] // self._step + 1) * self._step
 
     def _write(self) -> None:

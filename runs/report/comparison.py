@@ -16,10 +16,7 @@ from macs.fronts.verified import feasible_as_simulated
 from macs.io.console import Steps
 from macs.io.text import counted
 from macs.pareto.dominance import nondominated
-from transcription import from_dict, parse
-from transcription.inner.base import iteration_work
 
-from ..batch.cells import Cell
 from ..batch.store import Store, StoredRun
 from ..execution.task import COUNTS, CRASHED, MEMORY, TIMEOUT, FinalStates, final_states, record
 from ..files import errors_begin_with
@@ -205,7 +202,7 @@ INDICATORS: Mapping[str, Callable[..., float]] = {
 }
 CURVED = ("GD", "IGD", "IGD+")
 """Indicators that take a dense reference for a curve, unless `curve` is False."""
-CHARGED = "charged evaluations"
+CHARGED, PROCESSOR = "charged evaluations", "seconds of processor"
 AXES: Mapping[str, tuple[str, str]] = {
     "evaluations": ("evaluations", "evaluations"),
     CHARGED: ("evaluations", CHARGED),
@@ -237,75 +234,45 @@ def samples(comparison: Comparison, reference: Reference, *, curve: bool = True)
 class Charge:
     """What gradient solves, and evaluations that take more than others, cost in evaluations of the cheapest kind.
 
-    The charged evaluations of a run are all of its counted work divided by `unit`. Work is counted in iterations of IPOPT times variables,
-    see `Counts`; these take more or fewer instructions on programs of different kinds, so it is multiplied by `prices`.
+    The charged evaluations of a run are what its counted work is charged, see `Counts`, divided by `unit`.
     """
 
     unit: float  # what an evaluation takes, in the mean of its runs, by the solver without gradient solves whose evaluations take least
     solver: str  # that solver
-    # Instructions that a unit of work takes on the cell's transcription, and on that of its gradient solves; 1 where all are on one.
-    prices: Mapping[Cell, tuple[float, float]]
 
     @classmethod
     def of(cls, comparison: Comparison) -> Charge | None:
         """The charge of a comparison; None if every solver makes gradient solves, or work was not counted, as for black boxes."""
-        runs = [run for ones in comparison.runs.values() for run in ones]
-        if not all("gradient_work" in run.front.stats for run in runs):
-            return None
-        prices = _prices(runs)
-        if prices is None:
+        stats = {solver: [run.front.stats for run in runs] for solver, runs in comparison.runs.items() if runs}
+        if not all("charge" in one for ones in stats.values() for one in ones):
             return None
         taken = {
-            solver: float(np.mean([_evaluated(run.front.stats, prices[run.cell][0]) / run.front.stats["evaluations"] for run in ones]))
-            for solver, ones in comparison.runs.items()
-            if ones and all(run.front.stats["evaluations"] and not run.front.stats["gradient_solves"] for run in ones)
+            solver: float(np.mean([one["charge"] / one["evaluations"] for one in ones]))
+            for solver, ones in stats.items()
+            if all(one["evaluations"] and one["charge"] and not one["gradient_solves"] for one in ones)
         }
-        taken = {solver: work for solver, work in taken.items() if work > 0.0}
         if not taken:
             return None
         solver = min(taken, key=lambda one: taken[one])
-        return cls(taken[solver], solver, prices)
+        return cls(taken[solver], solver)
 
-    def __call__(self, cell: Cell, counts: Mapping[str, Any]) -> Any:
-        """Charged evaluations of a run of a cell: of its `work` and `gradient_work`, numbers or arrays."""
-        price, of_gradients = self.prices[cell]
-        return (_evaluated(counts, price) + np.asarray(counts["gradient_work"], dtype=float) * of_gradients) / self.unit
-
-
-def _evaluated(counts: Mapping[str, Any], price: float) -> Any:
-    """What the evaluations took, without gradient solves."""
-    return (np.asarray(counts["work"], dtype=float) - np.asarray(counts["gradient_work"], dtype=float)) * price
-
-
-def _prices(runs: list[StoredRun]) -> dict[Cell, tuple[float, float]] | None:
-    """Of the cells of some runs, see `Charge`; None where transcriptions differ and the problem is not found, so that none can be made."""
-    schemes = {}
-    for cell in {run.cell: None for run in runs}:
-        own = cell.details["transcription"]
-        other = cell.details["solver"]["settings"].get("polish_on")
-        if own is None:
-            return None
-        schemes[cell] = from_dict(own), parse(other) if other else from_dict(own)
-    different = {repr(one): one for pair in schemes.values() for one in pair}
-    if len(different) == 1:
-        return dict.fromkeys(schemes, (1.0, 1.0))
-    source = runs[0].front.source
-    if source is None or not source.address:
-        return None
-    problem = source.load().compile()
-    price = {name: iteration_work(nlp) / len(nlp.lower) for name, nlp in ((name, one.nlp(problem)) for name, one in different.items())}
-    return {cell: (price[repr(own)], price[repr(other)]) for cell, (own, other) in schemes.items()}
+    def __call__(self, counts: Mapping[str, Any]) -> Any:
+        """Charged evaluations of the `charge` of a run so far, a number or an array."""
+        return np.asarray(counts["charge"], dtype=float) / self.unit
 
 
 def spent(comparison: Comparison, charge: Charge | None = None) -> dict[str, dict[str, list[float]]]:
     """{cost: {solver: a value for each finished run}}; charged evaluations and work of those that record it."""
-    keys = {key.replace("_", " "): key for key in COUNTS} | {"time [s]": "wall_time"}
+    keys = {key.replace("_", " "): key for key in COUNTS if key != "charge"} | {"time [s]": "wall_time"}
     found = {
         name: {solver: [float(run.front.stats[key]) for run in runs if key in run.front.stats] for solver, runs in comparison.runs.items()}
         for name, key in keys.items()
     }
     if charge is not None:
-        found[CHARGED] = {solver: [float(charge(run.cell, run.front.stats)) for run in runs] for solver, runs in comparison.runs.items()}
+        found[CHARGED] = {solver: [float(charge(run.front.stats)) for run in runs] for solver, runs in comparison.runs.items()}
+    found[PROCESSOR] = {
+        solver: [run.history["cpu"][-1] for run in runs if run.history.get("cpu")] for solver, runs in comparison.runs.items()
+    }
     return {name: {solver: values for solver, values in solvers.items() if values} for name, solvers in found.items()}
 
 
@@ -320,9 +287,9 @@ def histories(comparison: Comparison, reference: Reference, name: str, axis: str
         for solver, runs in comparison.runs.items()
         if (
             known := [
-                _history(run, reference, name, charge(run.cell, run.history) if axis == CHARGED and charge else run.history[key])
+                _history(run, reference, name, charge(run.history) if axis == CHARGED and charge else run.history[key])
                 for run in runs
-                if run.history.get("F") and any(run.history[key]) and (axis != CHARGED or "gradient_work" in run.history)
+                if run.history.get("F") and any(run.history[key]) and (axis != CHARGED or "charge" in run.history)
             ]
         )
     }

@@ -73,7 +73,7 @@ def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[s
 
 
 def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Table]:
-    """A row for each cost and solver: evaluations, inner iterations, gradient solves, work, charged evaluations and time of a run."""
+    """A row for each cost and solver: evaluations, inner iterations, gradient solves, work, charged evaluations and times of a run."""
     charge = Charge.of(comparison)
     rows: list[list[Cell]] = [
         [cost, solver, summary.count, summary.mean, summary.median, summary.best, summary.worst]
@@ -87,8 +87,8 @@ def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, T
     if charge is not None:
         notes.append(
             f"{CHARGED.capitalize()}: all work of a run, gradient solves included, divided by what an evaluation of {charge.solver} takes, "
-            "which takes least of the solvers without gradient solves. Work on transcriptions of different kinds is compared by the "
-            "instructions that it takes."
+            "which takes least of the solvers without gradient solves. Each kind of work has a price from counts and sizes, in time of a "
+            "processor, which macs bench charges measures."
         )
     return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.", notes)}
 

@@ -224,7 +224,7 @@ def test_the_points_so_far_of_runs_that_have_not_ended_are_shown(out):
     cell = stated.cells[0]
     (run,) = (run for run in Store.open(out).runs(2) if run.cell.labels == cell.labels and run.number == 2)
     samples = ArchiveSamples(60, path=run.path.with_suffix(".samples"))
-    counts = {"evaluations": 20, "inner_iterations": 0, "gradient_solves": 0, "work": 0, "gradient_work": 0}
+    counts = {"evaluations": 20, "inner_iterations": 0, "gradient_solves": 0, "work": 0, "charge": 0}
     samples.note(SimpleNamespace(**counts, elapsed=1.0, F=np.array([[1.0, -3.0], [2.0, -6.0]])))
     with Store.claim(out, stated.definition()):
         pass

@@ -12,8 +12,9 @@ from problems.checks import short_repr
 from problems.compiled import remembered
 
 from ..base import CONVERGED, FAILED, NLP, TIMEOUT, largest
-from ..nlp.derivatives import too_dense
-from ..numerics.batched import work
+from ..nlp.derivatives import gradients, hessian, too_dense
+from ..nlp.program import Watched
+from ..numerics.batched import PRICES, Batched, work
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -186,3 +187,33 @@ def iteration_work(nlp: NLP) -> float:
     """Instructions that take as long as an iteration of IPOPT: by these, programs of different kinds are comparable."""
     entries = nlp.dense if too_dense(nlp) else nlp.functions.jac_sparsity(1, 0).nnz()
     return 6 * work(nlp.functions) + 70_000 + 22 * entries
+
+
+# Charges compare costs of different kinds, and of different programs: nanoseconds by `PRICES`, from counts and sizes alone.
+
+
+def spent(nlp: NLP) -> int:
+    """Charged for all propagations, evaluations, their derivatives, and iterations of IPOPT so far."""
+    reduced = nlp.__dict__.get("reduced")
+    known = [*nlp.__dict__.values(), *nlp.derived.values(), *(reduced.derived.values() if reduced is not None else ())]
+    iterations = sum(one.iterations for one in known if isinstance(one, Watched))
+    steps = 0 if reduced is None else int(reduced.differentiated @ (PRICES["steps"], PRICES["step"]))
+    return sum(one.spent for one in known if isinstance(one, Batched)) + steps + (iterations and iterations * iteration_charge(nlp))
+
+
+def batch_charge(nlp: NLP, count: int) -> int:
+    """Of a batch of candidates, beside what is spent on them."""
+    return round(PRICES["batch"] + count * (PRICES["candidate"] + PRICES["number"] * (len(nlp.variables) + len(nlp.g_scale))))
+
+
+@remembered
+def iteration_charge(nlp: NLP) -> int:
+    """Of an iteration of IPOPT with exact derivatives."""
+    first, second = gradients(nlp), hessian(nlp)
+    entries = first.nnz_out("dg") + second.nnz_out("H") + len(nlp.variables) + len(nlp.g_scale)
+    return round(PRICES["iteration"] + PRICES["entry"] * entries + PRICES["derivative"] * (work(first) + work(second)))
+
+
+def solves_charge(nlp: NLP, count: int, iterations: int) -> int:
+    """Of gradient solves with so many iterations together."""
+    return round(PRICES["solve"] * count) + (iterations and iterations * iteration_charge(nlp))

@@ -43,7 +43,7 @@ class Watched:
 
     def __init__(self, name: str, parts: Any, options: Mapping[str, Any]) -> None:
         check_stopping()
-        self._watch = _Watch()
+        self._watch, self.iterations = _Watch(), 0  # of all calls so far
         self._solver = ca.nlpsol(name, "ipopt", parts, {**UNASKED, **options, "iteration_callback": self._watch})
 
     def __call__(self, **inputs: Any) -> dict[str, Any]:
@@ -62,6 +62,7 @@ class Watched:
         if watch.raised is not None:
             raise watch.raised
         reraise()
+        self.iterations += max(0, self._solver.stats()["iter_count"])
         return answer
 
     def stats(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,27 @@ BLOCK = 64
 """Most calls at once: each number of them needs a Function of its own."""
 WORTH_A_BLOCK = 24
 """Calls of a block of so many from which on all of them, by a wide Function, take less time."""
+COSTLY = {
+    *(ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_ATAN2),
+    *(ca.OP_SINH, ca.OP_COSH, ca.OP_TANH, ca.OP_EXP, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_ERF),
+}
+"""Operations that take some tens of times as long as a sum."""
+PRICES = {
+    "compiled": 0.35,  # an instruction of a Function that is compiled
+    "costly": 10.0,  # beside that, if it is costly
+    "interpreted": 2.6,  # an instruction of another Function
+    "root": 12,  # times what the residual and derivatives of a rootfinder take
+    "batch": 500_000,  # a batch of candidates, beside what they take
+    "candidate": 40_000,  # each of them
+    "number": 60,  # of its variables and rows
+    "steps": 250_000,  # steps of Newton's method of a batch, beside their derivatives
+    "step": 50_000,  # each of them
+    "solve": 15_000_000,  # a gradient solve, beside its iterations
+    "iteration": 400_000,  # of IPOPT, beside the following
+    "entry": 100,  # of the matrix that it factorises
+    "derivative": 10,  # an instruction of exact derivatives
+}
+"""Nanoseconds of one processor for each kind of work, fitted to its times (`macs bench charges`), which make different work comparable."""
 CHAIN = "chain"
 """Name of a Function of so many repetitions that it, and all that it is a part of, is not to be written out."""
 
@@ -130,6 +152,7 @@ class Batched:
         # Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function of 1500 is worth compiling.
         self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else 30_000_000
         self._work, self.instructions, self._length = 0, work(function), _length(function)
+        self._calls, self._charged = 0, (function, compiled and self._length <= LONGEST_COMPILED and not calls_externals(function))
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
         """Outputs (k, nonzeros of each) for k calls.
@@ -139,10 +162,20 @@ class Batched:
         k = len(inputs[0])
         arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
         outputs = self._evaluate(arrays, k)
-        self._work += k * self.instructions
+        self._work, self._calls = self._work + k * self.instructions, self._calls + k
         if self._may_compile and self._work * 1500 > self._pays * max(self._length, 1500):
             self._compile(arrays, outputs)
         return outputs
+
+    @cached_property
+    def nanoseconds(self) -> int:
+        """What is charged for one call, whether or not there is a compiler here."""
+        return round(nanoseconds(*self._charged))
+
+    @property
+    def spent(self) -> int:
+        """Nanoseconds charged for all calls so far."""
+        return self._calls * self.nanoseconds if self._calls else 0
 
     def _evaluate(self, arrays: list[np.ndarray], k: int) -> list[np.ndarray]:
         if self._wide and not self._width and k >= WORTH_A_BLOCK:
@@ -202,6 +235,28 @@ def work(function: ca.Function) -> int:
         return 0
     calls = (i for i in range(function.n_instructions()) if function.instruction_id(i) == ca.OP_CALL)
     return function.n_instructions() + sum(work(function.instruction_MX(i).which_function()) for i in calls)
+
+
+def nanoseconds(function: ca.Function, compiled: bool) -> float:
+    """What is charged for one call of a Function, from its instructions alone."""
+    known: dict[int, float] = {}
+
+    def charged(one: ca.Function) -> float:
+        if one.is_a("Map"):
+            information = one.info()
+            return information["n"] * charged(information["f"])
+        if not one.is_a("SXFunction") and not one.is_a("MXFunction"):
+            return PRICES["root"] * sum(charged(part) for part in one.find_functions())
+        if (key := one.__hash__()) not in known:
+            count, many = one.n_instructions(), one.is_a("MXFunction")
+            kinds = [one.instruction_id(i) for i in range(count)] if compiled or many else []
+            costly = PRICES["costly"] * sum(kind in COSTLY for kind in kinds)
+            own = PRICES["compiled"] * count + costly if compiled else PRICES["interpreted"] * count
+            calls = [i for i, kind in enumerate(kinds) if many and kind == ca.OP_CALL]
+            known[key] = own + sum(charged(one.instruction_MX(i).which_function()) for i in calls)
+        return known[key]
+
+    return charged(function)
 
 
 def _length(function: ca.Function) -> int:

@@ -39,6 +39,7 @@ class Reduced(Deriving):
         scores: tuple[ca.Function, np.ndarray] | None = None,
     ) -> None:
         self._layout, self._writers = layout, writers
+        self.differentiated = np.zeros(2, dtype=int)  # number of batches, and of vectors, whose derivatives were taken so far
         self._peaks, self._largest = peaks
         self._rest, g_lower, g_upper, g_scale = rest
         self._scores = scores
@@ -70,6 +71,7 @@ class Reduced(Deriving):
     def derivatives(self, propagated: Propagated, rows: np.ndarray) -> np.ndarray:
         """Total derivatives by the free variables of the rows with these indices, (k, count, d)."""
         interior = bool(self.inside[rows].any())
+        self.differentiated += 1, len(propagated.Z)
         function, chosen = self._derivatives(interior), rows if interior else self._among_ends[rows]
         count, d = len(self.inside) if interior else int(np.sum(~self.inside)), len(self._layout.free)
         found = np.empty((len(propagated.Z), len(rows), d))
