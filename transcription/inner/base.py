@@ -195,10 +195,11 @@ def iteration_work(nlp: NLP) -> float:
 def spent(nlp: NLP) -> int:
     """Charged for all propagations, evaluations, their derivatives, and iterations of IPOPT so far."""
     reduced = nlp.__dict__.get("reduced")
-    known = [*nlp.__dict__.values(), *nlp.derived.values(), *(reduced.derived.values() if reduced is not None else ())]
+    steps, more = (reduced.differentiated, reduced.derived.values()) if reduced is not None else (np.zeros(2), ())
+    known = [*nlp.__dict__.values(), *nlp.derived.values(), *more]
+    calls = sum(one.calls * one.nanoseconds for one in known if isinstance(one, Batched) and one.calls)
     iterations = sum(one.iterations for one in known if isinstance(one, Watched))
-    steps = 0 if reduced is None else int(reduced.differentiated @ (PRICES["steps"], PRICES["step"]))
-    return sum(one.spent for one in known if isinstance(one, Batched)) + steps + (iterations and iterations * iteration_charge(nlp))
+    return int(steps @ (PRICES["steps"], PRICES["step"])) + calls + solves_charge(nlp, 0, iterations)
 
 
 def batch_charge(nlp: NLP, count: int) -> int:

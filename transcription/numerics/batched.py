@@ -34,10 +34,8 @@ BLOCK = 64
 """Most calls at once: each number of them needs a Function of its own."""
 WORTH_A_BLOCK = 24
 """Calls of a block of so many from which on all of them, by a wide Function, take less time."""
-COSTLY = {
-    *(ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_ATAN2),
-    *(ca.OP_SINH, ca.OP_COSH, ca.OP_TANH, ca.OP_EXP, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_ERF),
-}
+COSTLY = {ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_ATAN2, ca.OP_SINH, ca.OP_COSH, ca.OP_TANH}
+COSTLY |= {ca.OP_EXP, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_ERF}
 """Operations that take some tens of times as long as a sum."""
 PRICES = {
     "compiled": 0.35,  # an instruction of a Function that is compiled
@@ -152,7 +150,7 @@ class Batched:
         # Instructions done, some tenths of a second of CasADi's virtual machine, after which a Function of 1500 is worth compiling.
         self._pays = 0 if os.environ.get("MACS_COMPILE") == "always" else 30_000_000
         self._work, self.instructions, self._length = 0, work(function), _length(function)
-        self._calls, self._charged = 0, (function, compiled and self._length <= LONGEST_COMPILED and not calls_externals(function))
+        self.calls, self._charged = 0, (function, compiled and self._length <= LONGEST_COMPILED and not calls_externals(function))
 
     def __call__(self, *inputs: np.ndarray) -> list[np.ndarray]:
         """Outputs (k, nonzeros of each) for k calls.
@@ -162,20 +160,15 @@ class Batched:
         k = len(inputs[0])
         arrays = [np.ascontiguousarray(values, dtype=float) for values in inputs]
         outputs = self._evaluate(arrays, k)
-        self._work, self._calls = self._work + k * self.instructions, self._calls + k
+        self._work, self.calls = self._work + k * self.instructions, self.calls + k
         if self._may_compile and self._work * 1500 > self._pays * max(self._length, 1500):
             self._compile(arrays, outputs)
         return outputs
 
     @cached_property
     def nanoseconds(self) -> int:
-        """What is charged for one call, whether or not there is a compiler here."""
-        return round(nanoseconds(*self._charged))
-
-    @property
-    def spent(self) -> int:
-        """Nanoseconds charged for all calls so far."""
-        return self._calls * self.nanoseconds if self._calls else 0
+        """What is charged for a call, whether or not there is a compiler here."""
+        return round(_nanoseconds(*self._charged, {}))
 
     def _evaluate(self, arrays: list[np.ndarray], k: int) -> list[np.ndarray]:
         if self._wide and not self._width and k >= WORTH_A_BLOCK:
@@ -237,26 +230,22 @@ def work(function: ca.Function) -> int:
     return function.n_instructions() + sum(work(function.instruction_MX(i).which_function()) for i in calls)
 
 
-def nanoseconds(function: ca.Function, compiled: bool) -> float:
-    """What is charged for one call of a Function, from its instructions alone."""
-    known: dict[int, float] = {}
-
-    def charged(one: ca.Function) -> float:
-        if one.is_a("Map"):
-            information = one.info()
-            return information["n"] * charged(information["f"])
-        if not one.is_a("SXFunction") and not one.is_a("MXFunction"):
-            return PRICES["root"] * sum(charged(part) for part in one.find_functions())
-        if (key := one.__hash__()) not in known:
-            count, many = one.n_instructions(), one.is_a("MXFunction")
-            kinds = [one.instruction_id(i) for i in range(count)] if compiled or many else []
-            costly = PRICES["costly"] * sum(kind in COSTLY for kind in kinds)
-            own = PRICES["compiled"] * count + costly if compiled else PRICES["interpreted"] * count
-            calls = [i for i, kind in enumerate(kinds) if many and kind == ca.OP_CALL]
-            known[key] = own + sum(charged(one.instruction_MX(i).which_function()) for i in calls)
-        return known[key]
-
-    return charged(function)
+def _nanoseconds(function: ca.Function, compiled: bool, known: dict[int, float]) -> float:
+    """What is charged for one call of a Function, from its instructions alone; `known` of its parts."""
+    if function.is_a("Map"):
+        information = function.info()
+        return information["n"] * _nanoseconds(information["f"], compiled, known)
+    flat = function.is_a("SXFunction")
+    if not flat and not function.is_a("MXFunction"):
+        return PRICES["root"] * sum(_nanoseconds(part, compiled, known) for part in function.find_functions())
+    if (key := hash(function)) not in known:
+        count = function.n_instructions()
+        kinds = [function.instruction_id(i) for i in range(count)] if compiled or not flat else []
+        costly = PRICES["costly"] * sum(kind in COSTLY for kind in kinds)
+        parts = [function.instruction_MX(i).which_function() for i, kind in enumerate(kinds) if not flat and kind == ca.OP_CALL]
+        own = PRICES["compiled"] * count + costly if compiled else PRICES["interpreted"] * count
+        known[key] = own + sum(_nanoseconds(part, compiled, known) for part in parts)
+    return known[key]
 
 
 def _length(function: ca.Function) -> int:
