@@ -38,19 +38,12 @@ COSTLY = {ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, c
 COSTLY |= {ca.OP_EXP, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_ERF}
 """Operations that take some tens of times as long as a sum."""
 PRICES = {
-    "compiled": 0.35,  # an instruction of a Function that is compiled
-    "costly": 10.0,  # beside that, if it is costly
-    "interpreted": 2.6,  # an instruction of another Function
-    "root": 12,  # times what the residual and derivatives of a rootfinder take
-    "batch": 500_000,  # a batch of candidates, beside what they take
-    "candidate": 40_000,  # each of them
-    "number": 60,  # of its variables and rows
-    "steps": 250_000,  # steps of Newton's method of a batch, beside their derivatives
-    "step": 50_000,  # each of them
-    "solve": 15_000_000,  # a gradient solve, beside its iterations
-    "iteration": 400_000,  # of IPOPT, beside the following
-    "entry": 100,  # of the matrix that it factorises
-    "derivative": 10,  # an instruction of exact derivatives
+    # An instruction: compiled, more if it is costly, not compiled; a rootfinder, in times of its residual with derivatives.
+    **{"compiled": 0.35, "costly": 10.0, "interpreted": 2.6, "root": 12},
+    # A batch of candidates, each of them, each number of its variables and rows; Newton's method: steps of a batch, each of them.
+    **{"batch": 500_000, "candidate": 40_000, "number": 60, "steps": 250_000, "step": 50_000},
+    # A gradient solve, an iteration of IPOPT, an entry of its matrix, an instruction of its derivatives.
+    **{"solve": 15_000_000, "iteration": 400_000, "entry": 100, "derivative": 10},
 }
 """Nanoseconds of one processor for each kind of work, fitted to its times (`macs bench charges`), which make different work comparable."""
 CHAIN = "chain"
