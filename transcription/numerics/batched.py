@@ -37,14 +37,12 @@ WORTH_A_BLOCK = 24
 COSTLY = {ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_ATAN2, ca.OP_SINH, ca.OP_COSH, ca.OP_TANH}
 COSTLY |= {ca.OP_EXP, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_ERF}
 """Operations that take some tens of times as long as a sum."""
-PRICES = {
-    # An instruction: compiled, more if it is costly, not compiled; a rootfinder, in times of its residual with derivatives.
-    **{"compiled": 0.35, "costly": 10.0, "interpreted": 2.6, "root": 12},
-    # A batch of candidates, each of them, each number of its variables and rows; Newton's method: steps of a batch, each of them.
-    **{"batch": 500_000, "candidate": 40_000, "number": 60, "steps": 250_000, "step": 50_000},
-    # A gradient solve, an iteration of IPOPT, an entry of its matrix, an instruction of its derivatives.
-    **{"solve": 15_000_000, "iteration": 400_000, "entry": 100, "derivative": 10},
-}
+# An instruction: compiled, more if it is costly, not compiled; a rootfinder, in times of its residual with derivatives.
+PRICES = {"compiled": 0.35, "costly": 10.0, "interpreted": 2.6, "root": 12}
+# A batch of candidates, each of them, each number of its variables and rows; Newton's method: steps of a batch, each of them.
+PRICES |= {"batch": 500_000, "candidate": 40_000, "number": 60, "steps": 250_000, "step": 50_000}
+# A gradient solve, an iteration of IPOPT, an entry of its matrix, an instruction of its derivatives.
+PRICES |= {"solve": 15_000_000, "iteration": 400_000, "entry": 100, "derivative": 10}
 """Nanoseconds of one processor for each kind of work, fitted to its times (`macs bench charges`), which make different work comparable."""
 CHAIN = "chain"
 """Name of a Function of so many repetitions that it, and all that it is a part of, is not to be written out."""
