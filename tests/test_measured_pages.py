@@ -103,9 +103,29 @@ def test_every_page_is_listed_with_its_minutes():
     assert sum(minutes for minutes, _ in listed.values()) <= 16 * 60, "eight hours of two processors"
 
 
+def test_the_index_of_papers_leads_somewhere(monkeypatch, tmp_path):
+    text = (SCRIPT.parents[1] / "measured.md").read_text(encoding="utf-8")
+    assert text.partition(make.BEGINS)[2].partition(make.ENDS)[0].strip() == make.index().strip(), (
+        "`python docs/measured/make.py` writes it"
+    )
+    monkeypatch.setattr(make, "HERE", tmp_path / "measured")
+    make.HERE.mkdir()
+    (make.HERE / "pages.toml").write_text("studies.one = 1\nbenches = {}\n")
+    rows = make.HERE / "papers.toml"
+    for row, words in (("", "leads nowhere"), (", at = ['two']", "no page 'two'"), (", at = ['none.md']", "no page 'none.md'")):
+        rows.write_text(f"paper = [{{title = 'A', rows = [{{is = 'Table 1', of = 'all'{row}}}]}}]")
+        with pytest.raises(ValueError, match=words):
+            make.index()
+    rows.write_text("paper = [{title = 'A', rows = [{is = 'Table 1', of = 'all', at = ['one']}]}]")
+    assert "| Table 1 | all | one, to be made |  |" in make.index()
+    (make.HERE / "one.md").write_text("# one")
+    assert "[one](measured/one.md)" in make.index()
+
+
 def test_what_is_out_of_date_is_made_again_the_cheapest_first(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(make, "listed", lambda: {"bench-zdt": (1, "macs bench zdt"), "mine": (60, "macs study report out/mine")})
     ran: list[list[str]] = []
+    monkeypatch.setattr(make, "write_index", lambda: None)
     monkeypatch.setattr(make, "_done", lambda words: bool(ran.append(words)) or "mine" not in words)
     assert make.main([], tmp_path) == 1
     said = capsys.readouterr()

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from runs.batch.code import code_of_measures, merged
@@ -29,6 +29,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 STUDIES = ROOT / "runs" / "studies"
 COMMAND = "python docs/measured/make.py"
+BEGINS, ENDS = "<!-- index: from papers.toml -->", "<!-- end of the index -->"
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
 
@@ -66,6 +67,36 @@ def now(command: str) -> tuple[str, dict[str, str]]:
         return digest(*files), BENCHES[shlex.split(command)[2]].code
     study = Study.load(files[0])
     return digest(*files), {**merged(study.code(cell) for cell in study.cells), **code_of_measures()}
+
+
+def index() -> str:
+    """Tables of the papers' tables and figures with links to where they are here. Raises ValueError for a row that leads nowhere."""
+    known, parts = listed(), []
+    for paper in tomllib.loads((HERE / "papers.toml").read_text(encoding="utf-8"))["paper"]:
+        parts += [f"**{paper['title']}**", "", "| there | what it shows | here | remarks |", "|---|---|---|---|"]
+        for row in paper["rows"]:
+            places = [_place(one, known) for one in row.get("at", [])]
+            if not places and not row.get("says"):
+                raise ValueError(f"{row['is']} of '{paper['title'][:40]}...' leads nowhere, without a reason")
+            parts.append(f"| {row['is']} | {row['of']} | {', '.join(places)} | {row.get('says', '')} |")
+        parts.append("")
+    return "\n".join(parts)
+
+
+def _place(at: str, known: Collection[str]) -> str:
+    """A link to a page of results, if it is made, or of the manual. Raises ValueError if there is no such page."""
+    if at in known:
+        return f"[{at}](measured/{at}.md)" if (HERE / f"{at}.md").is_file() else f"{at}, to be made"
+    if not (HERE.parent / at).is_file():
+        raise ValueError(f"papers.toml: there is no page '{at}'")
+    return f"[{Path(at).stem}]({at})"
+
+
+def write_index() -> None:
+    """Put the index into its place in the manual."""
+    page = HERE.parent / "measured.md"
+    before, _, rest = page.read_text(encoding="utf-8").partition(BEGINS)
+    page.write_text(f"{before}{BEGINS}\n\n{index()}\n{ENDS}{rest.partition(ENDS)[2]}", encoding="utf-8")
 
 
 def pages(folder: Path = HERE) -> list[Path]:
@@ -117,6 +148,7 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
         missing = [name for name in known if not (folder / f"{name}.md").exists()]
         print(f"not made yet: {', '.join(missing)}" if missing else "all are made")
         return int(not current or bool(missing))
+    write_index()
     todo = [name for name in known if name in given.names or (not given.names and not standing(folder / f"{name}.md", now)[1])]
     total = sum(known[name][0] for name in todo)
     print(f"{len(todo)} pages, about {total / 60:.1f} h of one processor: {', '.join(todo)}", flush=True)
@@ -125,6 +157,7 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
         for number, name in enumerate(todo, 1):
             before, (stated, command) = seconds(), known[name]
             failed += [] if make(name, command, given.jobs) else [name]
+            write_index()
             spent, elapsed = (seconds() - before) / 60, (time.perf_counter() - began) / 60
             print(
                 f"{number} of {len(todo)}: {name}, {spent:.1f} min of a processor ({stated:g} stated); {elapsed:.0f} min so far", flush=True
