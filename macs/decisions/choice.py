@@ -12,7 +12,7 @@ import numpy as np
 from problems.compiled import Objective
 
 from ..fronts.point import Point
-from ..io.text import html_block, html_table, text_table
+from ..io.text import html_block, html_table, numbers, text_table
 from ..preferences.preference import Preference
 from ..preferences.ranges import Ranges, confidence, sense_and_unit
 from ..preferences.stage import ordering
@@ -141,17 +141,20 @@ class Choice:
             heads = {"step": [step.name for step in self.history], "status": [step.status for step in self.history]}
             heads["value"] = [f"{step.value:.6g}" for step in self.history]
             heads |= {name: [f"{step.about[name]:.6g}" if name in step.about else "-" for step in self.history] for name in about}
-            lines += [choices_table(self.point.goals, heads, self.history)]
+            lines += [choices_table(self.point.goals, heads, self.history, self)]
             lines += [f"{step.name}: {step.message}" for step in self.history if step.message]
         return "\n".join([*lines, *(["", self.message] if self.message else [])])
 
+    def texts(self, name: str, values: Sequence[float]) -> list[str]:
+        """Values of an objective as text, with the digits that tables of a front with these ranges have."""
+        return numbers(values, (self.point.tolerances or {}).get(name, np.nan), [self.ranges.best[name], self.ranges.worst[name], *values])
+
     def degrees_table(self) -> str:
         """Each objective with its range and its degree, as plain text."""
-        ranges, J = self.ranges, self.objectives
         rows = [
             [
                 *(goal.name, sense_and_unit(goal)),
-                *(f"{value:.6g}" for value in (J[goal.name], ranges.best[goal.name], ranges.worst[goal.name])),
+                *self.texts(goal.name, [one[goal.name] for one in (self.objectives, self.ranges.best, self.ranges.worst)]),
                 degree_text(self.degrees[goal.name]),
             ]
             for goal in self.point.goals
@@ -187,17 +190,22 @@ class Turn:
     alternatives: tuple[Choice, ...] = ()
 
 
-def choices_table(goals: Sequence[Objective], heads: Mapping[str, Sequence[str]], rows: Sequence[Choice | Step | None]) -> str:
-    """A row for each choice or step as plain text: the cells under each head, then its objectives and their degrees."""
+def choices_table(
+    goals: Sequence[Objective], heads: Mapping[str, Sequence[str]], rows: Sequence[Choice | Step | None], last: Choice | None
+) -> str:
+    """A row for each choice or step as plain text: the cells under each head, then its objectives, with digits as in the last choice, and
+    their degrees."""
     titles = [*heads, *(goal.name for goal in goals), *["degree"] * len(goals)]
     units = [*[""] * len(heads), *map(sense_and_unit, goals), *(goal.name for goal in goals)]
+    values = [[np.nan if one is None else one.objectives[goal.name] for one in rows] for goal in goals]
+    texts = [["-"] * len(rows) if last is None else last.texts(goal.name, column) for goal, column in zip(goals, values, strict=True)]
     cells = [
         [
             *own,
-            *("-" if one is None else f"{one.objectives[goal.name]:.6g}" for goal in goals),
+            *(column[k].replace("nan", "-") for column in texts),
             *("-" if one is None else degree_text(one.degrees[goal.name]) for goal in goals),
         ]
-        for one, *own in zip(rows, *heads.values(), strict=True)
+        for k, (one, *own) in enumerate(zip(rows, *heads.values(), strict=True))
     ]
     return text_table([titles, units], cells, [title in ("step", "status", "asked") for title in titles])
 

@@ -265,7 +265,7 @@ class Dialogue:
         """The history as plain text: a row for each turn, with the objectives and their degrees."""
         turns = self.history
         heads = {"turn": [str(k + 1) for k in range(len(turns))], "asked": [shorten(turn.asked, 60, placeholder=" …") for turn in turns]}
-        return choices_table(self.goals, heads, [turn.choice for turn in turns])
+        return choices_table(self.goals, heads, [turn.choice for turn in turns], self.choice)
 
     def plot(self, by: Preference | None = None, figure: Any = None) -> Sequence[Axes]:
         """Axes with the degrees of all choices as bars, turn by turn, and one for each objective with its values.

@@ -287,9 +287,13 @@ class Point:
 
     @property
     def title(self) -> str:
-        """Objectives in one line: "flight time 141.2 s, horizontal speed 2.9 km/s"."""
-        named = zip(self.goals, self.objectives.values(), strict=True)
-        return ", ".join(f"{goal.name} {value:.6g} {goal.unit}".rstrip() for goal, value in named)
+        """Objectives in one line: "flight time 141.2 s, horizontal speed 2.900 km/s"."""
+        return ", ".join(f"{goal.name} {text} {goal.unit}".rstrip() for goal, text in zip(self.goals, self.texts, strict=True))
+
+    @property
+    def texts(self) -> list[str]:
+        """Objectives as text, with the digits that tables of its front have."""
+        return self._points.texts(self.objectives.values())
 
     def _repr_html_(self) -> str:
         """For notebooks: a table of the objectives and a small picture."""

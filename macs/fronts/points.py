@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self, overload
 
@@ -14,7 +14,7 @@ from transcription.trajectories.costates import Costates
 from transcription.trajectories.trajectory import Trajectory
 
 from ..io.netcdf import COUNT, NUMBER, TEXT, FileArray
-from ..io.text import counted
+from ..io.text import counted, numbers
 from .point import Point, number
 from .provenance import STATS, AnyCompiled, ProblemSource, versions
 
@@ -287,6 +287,11 @@ class Points:
     def resolution(self) -> np.ndarray:
         """Least tolerance (m,) of a point in each objective, in its unit: as far as its digits are verified; NaN where none was judged."""
         return np.fmin.reduce(self.tolerances, axis=0, initial=np.nan)
+
+    def texts(self, objectives: Iterable[float]) -> list[str]:
+        """Objectives (m,) of one point, in the user's units and senses, with the digits that tables of these points have."""
+        columns = zip(objectives, self.resolution, self.objectives.T, strict=True)
+        return [numbers([value], tolerance, among)[0] for value, tolerance, among in columns]
 
     @property
     def gain(self) -> np.ndarray:

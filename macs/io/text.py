@@ -22,15 +22,17 @@ def text_table(headers: Sequence[Sequence[str]], rows: Sequence[Sequence[str]], 
     return "\n".join(line.rstrip() for line in lines)
 
 
-def numbers(values: Any, tolerance: float = np.nan) -> list[str]:
+def numbers(values: Any, tolerance: float = np.nan, among: Any = None) -> list[str]:
     """A column of numbers with the same number of decimals: those within which they are known, and at least four digits of their range.
+    Some `among` others, such as one of a front, have as many as these.
 
     Without a `tolerance` in the column's unit, or where the numbers differ by no more, there are six significant digits and at least four
     of the column's range; one that would have fewer than five has more decimals, unless it is less than a millionth of the largest. The
     decimal points stay below each other.
     """
     values = np.asarray(values, dtype=float) + 0.0
-    finite = values[np.isfinite(values)]
+    column = values if among is None else np.asarray(among, dtype=float)
+    finite = column[np.isfinite(column)]
     largest = np.abs(finite).max(initial=0.0)
     if largest and not 1e-3 <= largest < 1e8:
         return [f"{value:.5e}" for value in values]

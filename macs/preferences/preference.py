@@ -275,10 +275,10 @@ class Ranking:
         """
         front, shown = self.front, self.order[:rows]
         titles, units, cells = ["rank", "#"], ["", ""], [[str(k + 1) for k in range(len(shown))], [str(i) for i in shown]]
-        for goal, column in zip(front.goals, front.objectives[shown].T, strict=True):
+        for goal, column, tolerance in zip(front.goals, front.objectives[shown].T, front.resolution, strict=True):
             titles.append(goal.name)
             units.append(sense_and_unit(goal))
-            cells.append(numbers(column))
+            cells.append(numbers(column, tolerance))
         for name, column in zip(self.stage_names, self.stage_values[shown].T, strict=True):
             if not np.isnan(column).all():
                 titles.append("value")

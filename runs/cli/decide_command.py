@@ -302,7 +302,7 @@ def _alternatives(dialogue: Dialogue) -> str:
     found = dialogue.alternatives_found
     if not found:
         return "No other choice was found about the present one."
-    return choices_table(dialogue.goals, {"alternative": [str(k + 1) for k in range(len(found))]}, found)
+    return choices_table(dialogue.goals, {"alternative": [str(k + 1) for k in range(len(found))]}, found, found[0])
 
 
 def _saved(dialogue: Dialogue, kind: str, path: str) -> str:

@@ -15,7 +15,7 @@ from macs.evaluation.evaluator import CONVERGED
 from macs.front import Front
 from macs.fronts.pictures.flight_plot import along, quantities
 from macs.fronts.pictures.front_plot import draw_designs
-from macs.fronts.pictures.style import COLORS, axis_label, blank_figure, time_label
+from macs.fronts.pictures.style import COLORS, axis_label, blank_figure, quantity, time_label
 from macs.fronts.point import Point
 from macs.io.text import label
 from macs.pareto.spread import spread
@@ -246,6 +246,5 @@ def _lines(phase: PhaseTrajectory, derived: Derived | None = None) -> dict[str, 
 
 def _title(name: str, point: Point, width: int) -> str:
     """The point's name and objectives, in lines of at most `width` characters."""
-    values = {name: f"{value:.5g}".replace("-", "\N{MINUS SIGN}") for name, value in point.objectives.items()}
-    lines = [f"{goal.name} {values[goal.name]} {goal.unit}".rstrip() for goal in point.goals]
+    lines = [f"{goal.name} {quantity(text, goal.unit)}" for goal, text in zip(point.goals, point.texts, strict=True)]
     return "\n".join(part for line in [name, *lines] for part in wrap(line, width))

@@ -267,8 +267,8 @@ def point_html(point: Any) -> str:
     simulated = point.simulated
     heads = ["objective", "", "value", *(["simulated"] if simulated is not None else [])]
     rows = [
-        [goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]", f"{value:.6g}", *([f"{simulated[goal.name]:.6g}"] if simulated else [])]
-        for goal, value in zip(point.goals, point.objectives.values(), strict=True)
+        [goal.name, f"{goal.sense[:3]} [{goal.unit or '-'}]", *values]
+        for goal, *values in zip(point.goals, point.texts, *([point._points.texts(simulated.values())] if simulated else []), strict=True)
     ]
     state = {None: "not simulated", True: "verified", False: "not verified"}[point.verified]
     about = [f"{point.status}, {state}; violation {point.violation:.1e}"]

@@ -14,7 +14,7 @@ import numpy as np
 from problems.compiled import Objective
 
 from ...io.atomic import write_whole
-from ...io.text import counted, numbers
+from ...io.text import counted
 from ..curve import curve_of
 from .style import (
     COLORS,
@@ -36,7 +36,7 @@ from .style import (
     new_figure,
     note_above,
     panel_grid,
-    raised,
+    quantity,
     rendered,
     styled,
     title_and_legend,
@@ -152,7 +152,7 @@ def _scatter(front: Any, ax: Any, marked: Sequence[int]) -> None:
         if ends:
             getattr(ax, f"set_{axis}lim")(*ends)
     for i, edge in zip(marked, COLORS, strict=False):
-        ax.scatter(*axes[:, [i]], zorder=4, label=_values(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
+        ax.scatter(*axes[:, [i]], zorder=4, label=_named(front, i), s=80, facecolors="none", edgecolors=edge, linewidths=1.5)
     if len(front.goals) == 2 and good.sum() > 1 and not len(marked):
         _mark_extremes(front, ax)
 
@@ -180,16 +180,14 @@ def _about(values: np.ndarray) -> tuple[float, float] | None:
     return about(float(finite.min()), float(finite.max()))
 
 
-def _value(front: Any, number: int, k: int) -> str:
-    """An objective of a point with its unit, as tables have it."""
-    text = numbers(front.objectives[:, k], front.resolution[k])[number].strip()
-    return f"{text} {raised(front.goals[k].unit)}".rstrip()
+def _values(front: Any, number: int) -> list[str]:
+    """The objectives of a point with their units, as tables have them."""
+    return [quantity(text, goal.unit) for text, goal in zip(front.texts(front.objectives[number]), front.goals, strict=True)]
 
 
-def _values(front: Any, number: int) -> str:
+def _named(front: Any, number: int) -> str:
     """The number of a point and its objectives, for a legend."""
-    values = [_value(front, number, k) for k in range(len(front.goals))]
-    return f"#{range(len(front))[number]}: {', '.join(values)}"
+    return f"#{range(len(front))[number]}: {', '.join(_values(front, number))}"
 
 
 def _mark_extremes(front: Any, ax: Any) -> None:
@@ -198,7 +196,7 @@ def _mark_extremes(front: Any, ax: Any) -> None:
     for k, goal in enumerate(front.goals):
         best = int(np.lexsort([F[:, 1 - k], F[:, k]])[0])
         x, y = front.objectives[best]
-        text = f"best {goal.name}: {_value(front, best, k)} (#{best})"
+        text = f"best {goal.name}: {_values(front, best)[k]} (#{best})"
         marker = {"marker": "os"[k], "s": 80, "facecolors": "none", "edgecolors": COLORS[1 + k], "linewidths": 1.3}
         ax.scatter([x], [y], zorder=4, label=text, **marker)
 
@@ -224,7 +222,7 @@ def _parallel(front: Any, ax: Any, marked: Sequence[int]) -> None:
             ax.plot(row, color=GREY, lw=1.0, alpha=0.85, ls=look, label="" if k else name)
     for i, color in zip(marked, COLORS, strict=False):
         dashes = "--" if apart[i] else ":" if infeasible[i] else "-"
-        ax.plot(height[i], color=color, lw=2.2, ls=dashes, zorder=4, label=_values(front, i))
+        ax.plot(height[i], color=color, lw=2.2, ls=dashes, zorder=4, label=_named(front, i))
     parallel_axes(ax, front.goals, best, worst)
 
 

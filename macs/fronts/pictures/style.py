@@ -108,6 +108,11 @@ def raised(unit: str) -> str:
     return POWER.sub(lambda found: found[1] + found[2].translate(RAISED), unit)
 
 
+def quantity(number: str, unit: str) -> str:
+    """A number and its unit as print has them."""
+    return f"{number} {raised(unit)}".replace("-", "\N{MINUS SIGN}", number.count("-")).rstrip()
+
+
 def plain(text: str) -> str:
     """Words of the user for a picture: of two dollars matplotlib would make mathematics."""
     return text.replace("$", r"\$") if text.count("$") > 1 else text
@@ -118,7 +123,7 @@ def axis_number(value: float) -> str:
     text = f"{value + 0.0:.4g}" if abs(value) < 1e4 or abs(value) >= 1e7 else f"{value:.0f}"
     digits, _, power = text.partition("e")
     rest = f"\N{MULTIPLICATION SIGN}10{str(int(power)).translate(RAISED)}" if power else ""
-    return digits.replace("-", "\N{MINUS SIGN}") + rest
+    return quantity(digits, "") + rest
 
 
 def wrapped(text: str, width: float, size: float = 9.0) -> str:
@@ -181,8 +186,7 @@ def remark(point: Any) -> str:
 
 def caption(point: Any) -> str:
     """The objectives of a point with units as print has them, and the remark on it."""
-    named = zip(point.goals, point.objectives.values(), strict=True)
-    values = ", ".join(f"{goal.name} {value:.6g} {raised(goal.unit)}".rstrip() for goal, value in named)
+    values = ", ".join(f"{goal.name} {quantity(text, goal.unit)}" for goal, text in zip(point.goals, point.texts, strict=True))
     return "; ".join(filter(None, [values, remark(point)]))
 
 

@@ -11,8 +11,9 @@ import pytest
 from matplotlib.colors import to_hex
 from synthetic_fronts import black_box, costated, empty, flights, marked
 
+from macs.decisions import Choice, Ranges, WeightedSum
 from macs.fronts.pictures.flight_plot import _dense
-from macs.fronts.pictures.style import COLORS, axis_label, axis_number, blank_figure, draw_limits
+from macs.fronts.pictures.style import COLORS, axis_label, axis_number, blank_figure, caption, draw_limits
 from problems.compiled import Objective, Variable
 
 
@@ -48,6 +49,15 @@ def test_axes_have_units_and_senses_the_numbers_of_the_table_and_a_style_that_do
     for value in ("5.3510", "835267"):
         assert value in table.split()
     assert [text.get_text().split(" (")[0] for text in ax.get_legend().get_texts()] == ["best f0: 5.3510 kg", "best f1: 12.014"]
+    known = marked(front.replace(F=np.array([[-5.35104, 700.0], [6.706, 300.0], [8.352, 12.0142]])), [True] * 3)
+    cells = known.table().splitlines()[5].split()
+    assert known[0].title == f"f0 {cells[1]} kg, f1 {cells[2]}" == "f0 -5.35 kg, f1 700.0"
+    assert (
+        caption(known[0]) == "f0 \N{MINUS SIGN}5.35 kg, f1 700.0"
+        and "<td" in known[0]._repr_html_()
+        and "-5.351" not in known[0]._repr_html_()
+    )
+    assert {"-5.35", "700.0"} <= set(Choice.of(known[0], WeightedSum({"f0": 1.0, "f1": 1.0}), Ranges.of(known)).degrees_table().split())
     before = dict(matplotlib.rcParams)
     ax = blank_figure().add_subplot()
     assert flights().plot(ax=ax) is ax
