@@ -99,7 +99,7 @@ class Flights:
             found["representatives"] = front_figure(
                 {self.solver: self.comparison.fronts[self.solver]},
                 goals=self.comparison.known.goals,
-                reference=self.comparison.against.front,
+                reference=None if self.comparison.against.alone else self.comparison.against.front,
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,
             )

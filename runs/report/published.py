@@ -201,8 +201,7 @@ class Measure(Section):
         if self.take == "last":
             values = [one[self.state] for one in found.ends.values() if self.state in one][-1]
         else:
-            flights = [point.trajectory for point in found.front if point.trajectory is not None]
-            values = np.array([TAKEN[self.take](_whole(flight, self.state)) for flight in flights])
+            values = np.array([TAKEN[self.take](_whole(one.trajectory, self.state)) for one in found.front if one.trajectory])
         return self.factor * (values if self.at is None else np.abs(values - self.at))
 
 

@@ -176,19 +176,20 @@ def _figures(comparison: Comparison, further: Sequence[str]) -> dict[str, Figure
     reference = comparison.against
     name = "truth" if reference.true else "reference"
     found: dict[str, Figure] = choices_figures(comparison)
-    if not len(reference.front) or reference.alone:
+    if len(reference.front) < 2:
         return found
+    goals, against = comparison.known.goals, None if reference.alone else reference.front
     if "means" in further:
         means = {solver: [one.objectives.mean(axis=0)[None] for one in fronts if len(one)] for solver, fronts in comparison.fronts.items()}
-        found["means"] = front_figure(means, goals=[replace(goal, name=f"mean {goal.name}") for goal in comparison.known.goals])
-    if len(comparison.known.goals) > 1:
-        found["fronts"] = front_figure(comparison.fronts, goals=comparison.known.goals, reference=reference.front, truth_name=name)
-    if only_single_points(comparison):
+        found["means"] = front_figure(means, goals=[replace(goal, name=f"mean {goal.name}") for goal in goals])
+    if len(goals) > 1:
+        found["fronts"] = front_figure(comparison.fronts, goals=goals, reference=against, truth_name=name)
+    if reference.alone or only_single_points(comparison):
         return found
-    if len(comparison.known.goals) == 2:
+    if len(goals) == 2:
         surfaces = {solver: attainment(fronts) for solver, fronts in comparison.attaining().items()}
         if surfaces:
-            found["attainment"] = attainment_figure(surfaces, goals=comparison.known.goals, reference=reference.front, truth_name=name)
+            found["attainment"] = attainment_figure(surfaces, goals=goals, reference=reference.front, truth_name=name)
     charge = Charge.of(comparison)
     for indicator, larger in (("IGD", False), ("hypervolume", True)):
         for axis, (_, label) in AXES.items():
