@@ -31,6 +31,7 @@ class EndsLimits:
     # values, it was not determined by them, and a point where it is lower by more lies in another valley.
     loose: float = 1e-2
     rounds: int = 5  # most rounds in which optima are sought from each other
+    little: float = 1e-2  # what other objectives count in the sum whose least value is an end of a surface
     gain: float = 1e-6  # what counts as a gain then, in scales
     from_rivals: int = 3  # most times that results along a front are sought again from a better start that another one gave
     moved: float = 0.05  # where the ends of a front move by more than this part, the points between them move along
@@ -62,6 +63,26 @@ def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved]
                 break
             optima = [end for end in ends if end is not None]
     return optima
+
+
+@spending("ends")
+def proper_ends(solver: MultistartSolver, single: Callable[[int], Solved] | None = None, most: float = np.inf) -> list[Solved]:
+    """For each objective the least sum of all, in their ranges, in which the others count little: a properly efficient point (Geoffrion
+    1968) near the lexicographic optimum, by two solves instead of one for each other objective. From its optimum alone, `single(i)`, and
+    then from the best of the others' results; after the optima of single objectives, with at `most` so much work."""
+    m = len(solver.nlp.problem.goals)
+    optima = [(single or solver.single)(i) for i in range(m)]
+    good = [i for i, one in enumerate(optima) if one.status == CONVERGED]
+    if len(good) < m:
+        return optima
+    F, spans = np.array([one.F for one in optima]), _spans(optima)
+    weights = np.where(np.eye(m, dtype=bool), 1.0, ENDS.little) / np.where(spans > 0.0, spans, np.inf)
+    tasks = [Scalarised(F.min(axis=0), row, summed=True) for row in weights]
+    with solver.solves.within(most):
+        ends = solver.from_vectors([(one.z, task) for one, task in zip(optima, tasks, strict=True)])
+        others = [min((ends[k] for k in range(m) if k != i), key=tasks[i].rank) for i in range(m)]
+        again = solver.from_vectors([(one.z, task) for one, task in zip(others, tasks, strict=True)])
+    return [min(*both, key=task.rank) for *both, task in zip(ends, again, optima, tasks, strict=True)]
 
 
 def _from_each_other(solver: MultistartSolver, optima: list[Solved], tried: dict[tuple[int, int], np.ndarray]) -> None:

@@ -20,7 +20,7 @@ from transcription.stopping import stopping
 
 from ..evaluation.bilevel import Bilevel
 from ..evaluation.evaluator import CONVERGED, Evaluation, Evaluator
-from ..gradients.ends import METHODS, lexicographic_ends, solve_tasks, tasks_between
+from ..gradients.ends import METHODS, lexicographic_ends, proper_ends, solve_tasks, tasks_between
 from ..gradients.multistart import MULTISTART, MultistartSolver, MultistartStopping, Rules, Starts, guessed_start
 from ..gradients.polish import BudgetedSolves, PolishLog, polish
 from ..gradients.scalarised import MOST_ITERATIONS, WORK, GradientSolves, Scalarised
@@ -131,7 +131,9 @@ class Opening:
             first = self._single(solver, 0)
             if solver.starts and first.status != CONVERGED:
                 return self.optima  # agents' own solves begin elsewhere
-            found = lexicographic_ends(solver, lambda i: self._single(solver, i) if i else first, WORK.most)
+            surface = len(self._evaluator.goals) > CURVE
+            ends, most = (proper_ends, WORK.search) if surface else (lexicographic_ends, WORK.most)
+            found = ends(solver, lambda i: self._single(solver, i) if i else first, most)
             rows = [(i, loss) for i, one in solver.stopping.items() for loss in [*one.results, *[-np.inf] * one.convex]]
             self.starts = np.array(rows).reshape(-1, 2)
             if alike(self.starts, np.array([one.F for one in found])):
