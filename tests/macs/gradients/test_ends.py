@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs import optimize, payoff
-from macs.gradients.ends import ENDS, lexicographic_ends, moved_along
+from macs.gradients.ends import ENDS, lexicographic_ends, moved_along, proper_ends
 from macs.gradients.multistart import MultistartSolver
 from macs.gradients.scalarised import WEAK, GradientSolves, LexicographicEnd, Scalarised, without_loss
 from problems import Problem
@@ -20,14 +20,19 @@ from transcription.nlp.scalarized import Solved
 GOOD, POOR = -1.0, 1.0
 
 
-def solver_of_two_valleys() -> MultistartSolver:
-    """Objective 0 depends on the control alone; objective 1 on the control and on a parameter with valleys near -1 and 1."""
+def solver_of_two_valleys(more: bool = False) -> MultistartSolver:
+    """Objective 0 depends on the control alone; objective 1 on the control and on a parameter with valleys near -1 and 1; two `more` on
+    another parameter: where the one is least, the front is vertical."""
     problem = Problem("valleys")
     run = problem.phase("run", t0=0.0, tf=1.0)
     x, p = run.state("x", bounds=(-2, 2), initial=0), problem.parameter("p", bounds=(-2, 2))
     run.dynamics(x=run.control("u", bounds=(-1, 1)))
     problem.minimize("miss", (run.final(x) - 0.5) ** 2)
     problem.minimize("cost", (p**2 - 1) ** 2 + 0.2 * p + (run.final(x) + 0.5) ** 2)
+    if more:
+        q = problem.parameter("q", bounds=(-1, 1))
+        problem.minimize("steep", q**4)
+        problem.minimize("level", -q)
     return MultistartSolver(DFET(1, 1).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
 
 
@@ -35,7 +40,7 @@ def optimum_from(solver: MultistartSolver, i: int, p: float):
     place = [v.name for v in solver.nlp.variables].index("p")
     start = solver.nlp.first_guess(np.zeros((1, len(solver.nlp.free))))[0]
     start[place] = p
-    return solver.from_vector(start, Scalarised.single(i, 2)), place
+    return solver.from_vector(start, Scalarised.single(i, len(solver.nlp.problem.goals))), place
 
 
 @pytest.mark.parametrize("other", [GOOD, POOR])
@@ -46,6 +51,20 @@ def test_an_end_lies_in_the_best_valley_that_is_known(other):
     valley = min(np.roots([4, 0, -4, 0.2]).real, key=lambda p: abs(p - other))
     assert end.z[place] == pytest.approx(valley, abs=1e-5)
     assert end.F[0] <= first.F[0] + 1e-12 and end.F[1] == pytest.approx((valley**2 - 1) ** 2 + 0.2 * valley + 1.0, abs=1e-5)
+
+
+def test_ends_of_a_surface_give_up_little_for_much_and_lie_in_the_best_valley_that_is_known():
+    solver = solver_of_two_valleys(more=True)
+    optima = [optimum_from(solver, i, p)[0] for i, p in enumerate([0.9 * POOR, GOOD, GOOD, GOOD])]
+    before, spans = solver.solves.counts.gradient_solves, np.ptp([one.F for one in optima], axis=0)
+    ends = proper_ends(solver, optima.__getitem__)
+    p, q = ([v.name for v in solver.nlp.variables].index(name) for name in "pq")
+    valley = np.roots([4, 0, -4, 0.2]).real.min()
+    assert [end.z[p] for end in ends] == pytest.approx([valley] * 4, abs=1e-3) and optima[0].z[p] > 0
+    # The least of q^4 / span - 0.01 q / span, and not q = 0.
+    assert ends[2].z[q] == pytest.approx(np.cbrt(ENDS.little / 4 * spans[2] / spans[3]), rel=1e-3)
+    assert solver.solves.counts.gradient_solves == before + 8
+    assert proper_ends(solver, [replace(optima[0], status="failed"), *optima[1:]].__getitem__)[1] is optima[1]
 
 
 def test_optima_that_are_not_given_are_found():
