@@ -16,6 +16,7 @@ from ..evaluation.evaluator import CONVERGED
 from ..io.interrupts import spending
 from ..io.workers import TOGETHER
 from ..pareto.directions import divisions_below, simplex_lattice
+from ..pareto.dominance import ranges
 from .multistart import MULTISTART, MultistartSolver
 from .scalarised import END, WEAK, WORK, Scalarised, strongly_optimal, without_loss
 
@@ -28,10 +29,10 @@ class EndsLimits:
     """Limits of the search for lexicographic optima; fractions of an objective refer to its range between the ends."""
 
     # Part that is more than the tolerance of the objectives before it explains: if an objective falls by more while these keep their least
-    # values, it was not determined by them, and a point where it is lower by more lies in another valley.
+    # values, it was not determined by them, and a point where it is lower by more lies in another valley. Also what the others count in the
+    # sum whose least value is an end of a surface: they determine it where it is as loose.
     loose: float = 1e-2
     rounds: int = 5  # most rounds in which optima are sought from each other
-    little: float = 1e-2  # what other objectives count in the sum whose least value is an end of a surface
     gain: float = 1e-6  # what counts as a gain then, in scales
     from_rivals: int = 3  # most times that results along a front are sought again from a better start that another one gave
     moved: float = 0.05  # where the ends of a front move by more than this part, the points between them move along
@@ -72,11 +73,10 @@ def proper_ends(solver: MultistartSolver, single: Callable[[int], Solved] | None
     then from the best of the others' results; after the optima of single objectives, with at `most` so much work."""
     m = len(solver.nlp.problem.goals)
     optima = [(single or solver.single)(i) for i in range(m)]
-    good = [i for i, one in enumerate(optima) if one.status == CONVERGED]
-    if len(good) < m:
+    if any(one.status != CONVERGED for one in optima):
         return optima
-    F, spans = np.array([one.F for one in optima]), _spans(optima)
-    weights = np.where(np.eye(m, dtype=bool), 1.0, ENDS.little) / np.where(spans > 0.0, spans, np.inf)
+    F = np.array([one.F for one in optima])
+    weights = np.where(np.eye(m, dtype=bool), 1.0, ENDS.loose) / ranges(F)
     tasks = [Scalarised(F.min(axis=0), row, summed=True) for row in weights]
     with solver.solves.within(most):
         ends = solver.from_vectors([(one.z, task) for one, task in zip(optima, tasks, strict=True)])

@@ -62,7 +62,7 @@ def test_ends_of_a_surface_give_up_little_for_much_and_lie_in_the_best_valley_th
     valley = np.roots([4, 0, -4, 0.2]).real.min()
     assert [end.z[p] for end in ends] == pytest.approx([valley] * 4, abs=1e-3) and optima[0].z[p] > 0
     # The least of q^4 / span - 0.01 q / span, and not q = 0.
-    assert ends[2].z[q] == pytest.approx(np.cbrt(ENDS.little / 4 * spans[2] / spans[3]), rel=1e-3)
+    assert ends[2].z[q] == pytest.approx(np.cbrt(ENDS.loose / 4 * spans[2] / spans[3]), rel=1e-3)
     assert solver.solves.counts.gradient_solves == before + 8
     assert proper_ends(solver, [replace(optima[0], status="failed"), *optima[1:]].__getitem__)[1] is optima[1]
 
