@@ -183,13 +183,15 @@ class Page:
     def save(self, summary: StudySummary, study: Mapping[str, Any]) -> list[Path]:
         """Write the page and its pictures; returns their paths."""
         times = [run.wall_time for run in summary.runs]
+        of_processor = sum(run.history["cpu"][-1] for run in summary.runs if run.history.get("cpu"))
         code = merged(run.code for run in summary.runs)
         header = PageHeader.now(self._command, self._digest, {**code, **code_of_measures()})
         first = summary.runs[0].front.stats["versions"]
         what = ", ".join(f"{name} {number}" for name, number in (first or versions()).items() if name != "platform")
         made = (
             f"{counted(len(times), 'run')}, {duration(float(np.sum(times)))} together, {duration(float(np.median(times)))} in the median, "
-            f"on {_machine()}. Seeds are spawned from {study['seed']}. Page made on {header.date} by `{header.command}`. "
+            f"{duration(of_processor)} of a processor, on {_machine()}. Seeds are spawned from {study['seed']}. "
+            f"Page made on {header.date} by `{header.command}`. "
             f"Versions: {what}.{_of_several(code)}"
         )
         texts = [
