@@ -97,7 +97,8 @@ def runs_table(found: Sequence[Comparison]) -> Table:
     """A row for each finished run of some comparisons: its costs, the number of its points that count, and its indicators."""
     rows: list[list[Cell]] = []
     for comparison in found:
-        measured = samples(comparison, comparison.against) if len(comparison.against.front) else {}
+        known = comparison.against
+        measured = samples(comparison, known) if len(known.front) and not known.alone else {}
         for solver, runs in comparison.runs.items():
             for i, run in enumerate(runs):
                 stats, cpu, points = run.front.stats, run.history.get("cpu") or [None], len(comparison.fronts[solver][i])
