@@ -16,16 +16,17 @@ NEEDS_CHROMIUM = [
 ]
 
 
-def started():
-    """A browser; to be quit by the caller."""
+def started(webgl: bool = True):
+    """A browser; to be quit by the caller. WebGL needs a graphics card, here an emulated one, which takes 100 ms to paint a page; without
+    it Chromium paints by its own means, as on a machine without such a card."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
     options = webdriver.ChromeOptions()
     options.binary_location = BROWSER
-    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1300,1000", "--use-angle=swiftshader"):
+    graphics = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader") if webgl else ("--disable-gpu",)
+    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1300,1000", *graphics):
         options.add_argument(word)
-    options.add_argument("--enable-unsafe-swiftshader")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(options=options, service=Service(DRIVER))
     driver.set_script_timeout(30)

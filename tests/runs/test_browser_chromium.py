@@ -4,14 +4,15 @@ Skipped where there is no Chromium with its driver (Debian: chromium, chromium-d
 """
 
 import time
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from chromium import NEEDS_CHROMIUM, READY, errors, opened, wait, work_of
+from chromium import NEEDS_CHROMIUM, READY, errors, opened, started, wait, work_of
 from synthetic_fronts import black_box, flights, marked
 
-from macs import sweep
+from macs import Front, sweep
 from problems import load
 from runs.browser import page as pages
 from runs.browser.pages import front_page, run_data
@@ -112,10 +113,15 @@ return took.sort((a, b) => a - b)[15];
 """Milliseconds of work for a redraw, the median of 30."""
 
 
+@cache
+def ascents() -> Front:
+    return sweep(load("goddard"), parse("dfet:4x6:bernstein"), points=10, starts=1)
+
+
 def test_a_slider_moves_along_the_front_with_interpolated_trajectories(browser, tmp_path):
     from selenium.webdriver.common.keys import Keys
 
-    whole = sweep(load("goddard"), parse("dfet:4x6:bernstein"), points=10, starts=1)
+    whole = ascents()
     front, between = whole[[k for k in range(10) if k != 5]], whole[5]
     show(browser, tmp_path, front_page(front))
     places = browser.execute_script("return slide.places.map(({ values }) => values[0])")
@@ -164,6 +170,43 @@ def test_a_slider_moves_along_the_front_with_interpolated_trajectories(browser, 
         "Point 2:"
     )
     assert errors(browser) == []
+
+
+PAINTED = """
+const [moves, done] = arguments, range = byId('along-range'), took = [];
+const step = (began) => {
+  if (began) took.push(performance.now() - began);
+  if (took.length === 25) return done(took.sort((a, b) => a - b)[12]);
+  const now = performance.now();
+  if (moves) {
+    range.value = 20 + took.length;
+    range.dispatchEvent(new Event('input'));
+  } else byId('along-words').textContent = String(now);
+  requestAnimationFrame(() => requestAnimationFrame(() => step(now)));
+};
+step();
+"""
+"""Milliseconds until a place of the slider, or a word alone, is on the screen, the median of 25."""
+
+
+@pytest.mark.slow
+def test_a_place_of_the_slider_is_painted_as_soon_as_a_word_is(tmp_path):
+    from selenium.webdriver.common.keys import Keys
+
+    browser = started(webgl=False)
+    try:
+        show(browser, tmp_path, front_page(ascents()))
+        browser.execute_async_script(SLID, 20)
+        wait(browser, "panels.length >= 8 && panels.some(({ traces }) => traces.some(({ meta }) => meta !== null))")
+        word, place = (min(browser.execute_async_script(PAINTED, moves) for _ in range(3)) for moves in (False, True))
+        # 50 ms are asked for: it took 33, two frames, also with ten other programs at work. On a busy machine a word takes longer, too.
+        assert place < 1.5 * word, (place, word)
+        browser.execute_script("byId('along-range').focus()")
+        webdriver.ActionChains(browser).send_keys(*[Keys.ARROW_RIGHT] * 30).perform()
+        wait(browser, "slide.place === 74")
+        assert errors(browser) == []
+    finally:
+        browser.quit()
 
 
 @pytest.mark.slow
