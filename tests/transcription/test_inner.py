@@ -17,7 +17,7 @@ from macs import MACS, NSGA3
 from problems import Problem, load
 from transcription import DFET, NLP, Collocation, InnerResult, InnerSolver, MultipleShooting, SingleShooting
 from transcription.inner import NAMED, Ipopt, Newton, Projection, Propagate, Whole, inner_solver, levels
-from transcription.inner.base import evaluation_work, propagation_work, scored, started
+from transcription.inner.base import evaluation_work, propagation_work, scored, solves_charge, spent, started
 
 NAMES = ("auto", "propagate", "ipopt", "ipopt-feasibility")
 
@@ -339,3 +339,19 @@ def test_scores_are_of_what_is_within_the_tolerance_and_of_what_is_no_number() -
         assert np.array_equal(np.isnan(found.F).all(axis=1), broken) and found.clocked is (otherwise == "timeout")
         assert np.array_equal(found.z, np.where(broken[:, None], start, Z)) and found.moved == pytest.approx(np.where(broken, 0.0, 0.5))
         assert np.array_equal(found.iterations, np.arange(7)) and found.residuals is residuals
+
+
+def test_what_a_batch_is_charged_is_counted(monkeypatch):
+    """Twice the candidates take twice as much beside the batch itself, with a compiler or without; iterations of IPOPT have their price."""
+    charged = {}
+    for compiled in ("0", "always"):
+        monkeypatch.setenv("MACS_COMPILE", compiled)
+        nlp = DFET(2, 3).transcribe(load("goddard"))
+        some = (nlp.lower + 0.5 * nlp.span)[nlp.free][None].repeat(4, axis=0)
+        for count in (2, 4):
+            before = spent(nlp)
+            inner_solver("propagate").solve(nlp, some[:count])
+            charged[compiled, count] = spent(nlp) - before
+    assert charged["0", 4] == 2 * charged["0", 2] > 0 and charged["0", 4] == charged["always", 4]
+    before, iterations = spent(nlp), inner_solver("ipopt-feasibility").solve(nlp, some[:1]).iterations.sum()
+    assert spent(nlp) - before > solves_charge(nlp, 0, int(iterations)) > 0
