@@ -6,12 +6,25 @@ speed and terminal mass. Angle of attack, bank angle and thrust follow their com
 Electronic Systems 53(5), 2017; what it leaves out is chosen.
 """
 
-from macs import MACS
+from macs import Front, optimize
+from macs.decisions import Ranges, ReferencePoint, decide
 from problems import load
+from transcription import stated
 
-front = MACS().solve(load("smv"), seed=1)
+problem = load("smv")
+mesh = stated(problem.default_transcription)
+cool = optimize(problem, mesh, objective="heat load", starts=1)
+fast = optimize(problem, mesh, objective="flight time", start=cool.alone(), starts=1)
+speed, mass = (optimize(problem, mesh, objective=name, starts=1) for name in ("terminal speed", "terminal mass"))
+ends = Front.merge([point.alone() for point in (cool, fast, speed, mass)]).mended()
+
+ranges = Ranges.of(ends)
+middle = {"flight time": 500.0, "heat load": 55.0, "terminal speed": 5000.0, "terminal mass": 70e3}
+swift = {"flight time": 480.0, "heat load": 55.0, "terminal speed": 7700.0, "terminal mass": 27e3}
+between = [decide(problem, mesh, ReferencePoint(hopes), ranges=ranges, start=fast, starts=1).point for hopes in (middle, swift)]
+front = Front.merge([ends, *(point.alone() for point in between)])
 print(front.table())
-some = [0, 4, 6, 9]
+some = [0, 2, 4]
 front.plot(marked=some)
 front.plot_trajectories(some)
 
