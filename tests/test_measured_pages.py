@@ -137,6 +137,12 @@ def test_what_is_out_of_date_is_made_again_the_cheapest_first(tmp_path, monkeypa
         ["bench", "zdt", "--jobs", "2", "--keep", "out/bench-zdt"],
         ["study", "run", "mine", "--out", "out/mine", "--jobs", "2", "--fresh"],
     ]
+    monkeypatch.setattr(make, "HERE", tmp_path)
+    monkeypatch.setattr(make, "_done", lambda words: True)
+    (tmp_path / "mine.md").write_text("![new](mine-new.png)")
+    for picture in ("mine-new.png", "mine-old.png"):
+        (tmp_path / picture).touch()
+    assert make.main(["mine"], tmp_path) == 0 and [one.name for one in tmp_path.glob("*.png")] == ["mine-new.png"]
     monkeypatch.setattr(make, "_done", lambda words: (_ for _ in ()).throw(KeyboardInterrupt))
     assert make.main(["mine"], tmp_path) == make.INTERRUPTED and "goes on" in capsys.readouterr().err
     with pytest.raises(SystemExit):

@@ -108,8 +108,18 @@ def make(name: str, command: str, jobs: int) -> bool:
     """Make the runs of a page that are missing or by other code, and the page. Returns whether it is there. Raises KeyboardInterrupt."""
     words = shlex.split(command)[1:]
     if words[0] == "study":
-        return _done(["study", "run", name, "--out", words[2], "--jobs", str(jobs), "--fresh"]) and _done(words)
+        made = _done(["study", "run", name, "--out", words[2], "--jobs", str(jobs), "--fresh"]) and _done(words)
+        return made and tidied(name)
     return _done([*words, *(["--jobs", str(jobs), "--keep", f"out/{name}"] if words[1] in CONTESTS else [])])
+
+
+def tidied(name: str) -> bool:
+    """Remove pictures of earlier pages of this name that are not on it now; true."""
+    text = (HERE / f"{name}.md").read_text(encoding="utf-8")
+    for picture in HERE.glob(f"{name}-*.png"):
+        if picture.name not in text:
+            picture.unlink()
+    return True
 
 
 def _done(words: Sequence[str]) -> bool:
