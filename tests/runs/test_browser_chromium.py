@@ -169,6 +169,8 @@ def test_a_slider_moves_along_the_front_with_interpolated_trajectories(browser, 
     assert browser.execute_script("return slide.place === null && byId('along-range').getAttribute('aria-valuetext')").startswith(
         "Point 2:"
     )
+    marker = "moveAlong(30); return byId('plot').querySelectorAll(`.trace${byId('plot')._fullData[markers()[0]].uid} .point`).length"
+    assert browser.execute_script(marker) == 1, "from the first move on, not only at rest"
     assert errors(browser) == []
 
 

@@ -44,7 +44,10 @@ function endSlide() {
 function moveAlong(place) {
   const begins = slide.place === null;
   slide.place = place;
-  if (begins) showFlights();
+  if (begins) {
+    drawFront(); // with the marker
+    showFlights();
+  }
   slide.frame ||= requestAnimationFrame(() => {
     slide.frame = 0;
     redrawAlong();
