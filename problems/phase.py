@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from typing import Any
 
 import casadi as ca
@@ -312,6 +313,12 @@ class Phase:
         self._quantities[kind].append((symbol, inner))
         self._quantity_hashes.add(symbol.__hash__())
         return symbol
+
+    def _with_used(self, symbols: list[ca.MX]) -> Phase:
+        """A copy with those quantities only whose symbols are used."""
+        other, used = copy(self), {symbol.__hash__() for symbol in symbols}
+        other._quantities = {kind: [one for one in those if one[0].__hash__() in used] for kind, those in self._quantities.items()}
+        return other
 
     def _check_rates(self, given: Any) -> None:
         if set(given) != set(self._states):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from graphlib import CycleError
 from types import MappingProxyType
@@ -163,6 +164,16 @@ class Problem:
     def maximize(self, name: str, expr: Any, *, unit: str = "", scale: float | None = None) -> None:
         """Add an objective to be maximised; otherwise as `minimize`."""
         self._objective(name, expr, unit, "maximize", scale)
+
+    def with_objectives(self, *names: str) -> Problem:
+        """The same problem with these objectives only. Raises ValueError for one that it has not, with those that there are."""
+        other, unknown = copy(self), [name for name in names if name not in self._objectives]
+        if unknown:
+            raise ValueError(checks.unknown("objective", unknown[0], self._objectives))
+        other.address, other.data, other._objectives = "", {}, {name: self._objectives[name] for name in names}
+        used = ca.symvar(ca.vertcat(*(expr for _, expr in (*other._objectives.values(), *self._constraints.values()))))
+        other._phases = {name: phase._with_used(used) for name, phase in self._phases.items()}
+        return other
 
     def guess(self, **parameters: float) -> None:
         """Say from where to start: parameters by name."""

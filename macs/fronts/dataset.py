@@ -15,6 +15,7 @@ A new column of `Points` with an entry for each point is one more line of `point
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,6 +43,7 @@ from .columns import (
     variable_columns,
     variable_table,
 )
+from .curve import curve_of
 from .points import COLUMNS, Points
 from .provenance import read_source, read_stats, source_attributes, stats_attributes
 
@@ -65,6 +67,13 @@ ROOT: dict[str, FileArray] = {
         ("point", "objective"),
         NUMBER,
         "weights of the objectives, all minimised, in the sum to which costates belong, NaN without costates",
+        "see objective_unit",
+        optional=True,
+    ),
+    "curve_objectives": FileArray(
+        ("curve_place", "objective"),
+        NUMBER,
+        "places along the curve through the points, NaN in its gaps",
         "see objective_unit",
         optional=True,
     ),
@@ -372,6 +381,8 @@ def root_dataset(front: Points) -> Labelled:
     if any(one is not None for one in front.costates):
         none = np.full(len(front.goals), np.nan)
         arrays["weights"] = np.array([none if one is None else one.weights for one in front.costates])
+        with suppress(ValueError):  # there is no curve; it is for others: one that is read is made from the points again
+            arrays["curve_objectives"] = curve_of(front).sample()
     arrays |= {column.array: column.stored.of(getattr(front, name)) for name, column in COLUMNS.items() if column.stored}
     return Labelled(arrays, ROOT, _attributes(front))
 

@@ -15,6 +15,7 @@ from ..report.page import PageHeader, digest
 from .contest import CONTESTS
 from .contract import Bench, Row, save
 from .corpus import CORPUS, earlier
+from .curve import CURVE
 from .growth import GENERATION, SCALE
 from .inner import INNER, POPULATION
 from .parts import PARTS_BENCH
@@ -27,6 +28,7 @@ from .workers import WORKERS
 BENCHES: dict[str, Bench] = {
     **CONTESTS,
     "corpus": CORPUS,
+    "curve": CURVE,
     "front": FRONT,
     "generation": GENERATION,
     "inner": INNER,
@@ -51,12 +53,14 @@ def bench(
     csv: str | None = None,
     page: str | None = None,
     problems: Sequence[str] = (),
+    only: Sequence[str] = (),
     against: str | None = None,
     **studies: Any,
 ) -> bool:
     """Run some of `BENCHES`, one after the other; write all numbers to the file `csv`, if there is one.
 
-    Of the corpus, further `problems` by their addresses, and the CSV file of an earlier run whose values stand beside.
+    `only` these cases, by their names, or problems by their addresses. Of the corpus, further `problems` by their addresses, and the CSV
+    file of an earlier run whose values stand beside.
     `studies` are the settings `jobs`, `keep` and `solvers` of an `Effort`. The report of a single benchmark is also written to `page`, if
     there is one and it was not interrupted. Returns whether all targets are met.
     """
@@ -69,7 +73,8 @@ def bench(
         effort = one.quick if quick else one.full
         effort = replace(effort, rounds=seeds) if seeds and one.seeded else effort
         effort = replace(effort, **studies) if one.kept else effort
-        effort = replace(effort, cases=(*effort.cases, *problems))
+        chosen = [case for name in only for case in ([one for one in effort.cases if getattr(one, "name", one) == name] or [name])]
+        effort = replace(effort, cases=(*(chosen or effort.cases), *problems))
         interrupted = _measure(one, rows, effort)
         measured += [(kind, row) for row in rows]
         rows = [one for row in rows for one in (row, before.get(row.case)) if one is not None]

@@ -195,7 +195,7 @@ def compiling(when: str) -> AbstractContextManager[Any]:
 
 def finished(front: Front) -> Front:
     """A front, unless Ctrl-C ended its search: then `Stopped` is raised."""
-    if front.stats["stopped"] == "interrupted":
+    if front.stats.get("stopped") == "interrupted":
         raise Stopped("interrupted")
     return front
 

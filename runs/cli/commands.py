@@ -190,6 +190,11 @@ def bench(arguments: Namespace) -> int:
     for option, given in (("against", arguments.against), ("problems", arguments.problems)):
         if given and kind != "corpus":
             raise WrongCall(f"--{option}: is for the corpus")
+    if arguments.only and kind not in ("corpus", "curve"):
+        raise WrongCall(f"problems are for the corpus and for curves, not for '{kind}'")
+    for name in arguments.only:
+        if name not in [getattr(case, "name", case) for case in BENCHES[kind].full.cases]:
+            load_problem(name)
     chosen = tuple(dict.fromkeys(arguments.solvers or ()))
     if chosen:
         if not kind:
@@ -209,7 +214,7 @@ def bench(arguments: Namespace) -> int:
     # A folder that contains something else, or that another process has locked; a file of something else.
     with wrong_call_on_value_error() if arguments.keep or arguments.against else nullcontext():
         files = {"csv": arguments.csv, "page": arguments.page, "against": arguments.against}
-        return DONE if measure(kinds, problems=arguments.problems, **files, **settings) else FAILED
+        return DONE if measure(kinds, problems=arguments.problems, only=arguments.only, **files, **settings) else FAILED
 
 
 # Studies, and pages for the browser

@@ -41,6 +41,7 @@ Ratios against the alternatives, measured side by side in one run, with their sp
 
 constrained MW1-14 and DTLZ with constraints: MACS against the other algorithms at equal evaluations, hypervolume
 corpus      gradient solves, iterations and CPU time for one optimum of every problem, with defaults
+curve       fronts as curves: points and solves for an error, how many targets solved anew lie within it, and a finer mesh
 front       whole fronts by MACS until it is done, by its other inner levels to the same quality, and by sweeps from one and ten starts
 generation  how the time of a generation of NSGA-III grows with individuals, nodes and constraints, beside the orders of its paper
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
@@ -339,6 +340,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
         nargs="?",
         help="one of those above (default: all, which takes hours)",
     )
+    bench.add_argument("only", metavar="PROBLEM", nargs="*", help="of corpus and curve: only these, by name or file.py:function")
     bench.add_argument("--problems", metavar="PROBLEM", nargs="+", default=(), help="further ones of the corpus: file.py:function")
     bench.add_argument("--against", metavar="FILE.csv", help="the corpus beside what an earlier run wrote with --csv")
     bench.add_argument(

@@ -412,3 +412,20 @@ def test_a_comparison_is_no_expression(compare):
     refused(lambda: problem.constraint("c", compare(phase.tf), upper=0), "constraint 'c'", "is a comparison")
     refused(lambda: problem.minimize("f", compare(phase.tf)), "objective 'f'", "is a comparison")
     phase.dynamics(x=ca.if_else(x <= 0.5, 1, 0))
+
+
+def test_a_problem_with_some_of_its_objectives_needs_nothing_of_the_others():
+    problem, phase = bare()
+    x, u = phase.state("x", bounds=(0, 1)), phase.control("u", bounds=(-1, 1))
+    phase.dynamics(x=u)
+    problem.minimize("end", phase.final(x))
+    problem.minimize("top", phase.peak(x))
+    problem.maximize("effort", phase.integral(u**2), unit="N")
+    problem.constraint("area", phase.integral(x), upper=1)
+    two, all_three = problem.with_objectives("effort", "end").compile(), problem.compile()
+    assert [goal.name for goal in two.goals] == ["effort", "end"] and two.goals[0] == all_three.goals[2]
+    assert two.phases[0].peaks.size1_out(0) == 0 and all_three.phases[0].peaks.size1_out(0) == 1
+    # t0, tf, final x, integrals of u**2 and x.
+    q = [0.0, 1.0, 0.25, 7.0, 0.5]
+    assert np.array(two.objectives(q, [])).ravel().tolist() == [-7.0, 0.25] and float(two.constraints(q, [])) == 0.5
+    refused(lambda: problem.with_objectives("end", "efort"), "unknown objective 'efort', did you mean effort?")

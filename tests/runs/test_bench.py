@@ -10,11 +10,13 @@ from math import pi
 
 import numpy as np
 import pytest
+from smooth_problems import still
 
 from macs.io.console import Steps
 from macs.io.interrupts import Stopped
+from problems import Problem
 from problems.cases.standard import published
-from runs.bench import BENCHES, corpus, growth, header_of, inner, peers, searches, study, workers
+from runs.bench import BENCHES, corpus, curve, growth, header_of, inner, peers, searches, study, workers
 from runs.bench import published as optima
 from runs.bench.contract import Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
 from runs.cli import main
@@ -132,7 +134,10 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["studies"], ["studies", "study", "constrained, corpus, front, generation, inner, many, methods, parts, peers, population"]),
+        (
+            ["studies"],
+            ["studies", "study", "constrained, corpus, curve, front, generation, inner, many, methods, parts, peers, population"],
+        ),
         (["iner"], ["'iner'", "did you mean inner?"]),
         (["inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
         (["inner", "--seeds", "2"], ["'inner' has none"]),
@@ -141,6 +146,8 @@ def test_an_interrupt_ends_the_steps():
         (["uf", "--quick", "--keep", "here"], ["--keep"]),
         (["inner", "--solvers", "MACS"], ["--solvers"]),
         (["--solvers", "MACS"], ["--solvers: of which one"]),
+        (["inner", "goddard"], ["for the corpus and for curves, not for 'inner'"]),
+        (["curve", "godard"], ["there is no problem 'godard', did you mean 'goddard'?"]),
         (["uf", "--solvers", "MACS", "RVEA"], ["unknown solver 'RVEA'"]),
         (["uf", "--solvers", "NSGA-II"], ["MACS must be among them"]),
     ],
@@ -191,11 +198,18 @@ def search_rows(ratio: float, evaluations: float = 20_000.0) -> list[Row]:
     return [Row("landing_site", searches.OURS, {"ratio": times(ratio), "evaluations": [evaluations]})]
 
 
+def curve_rows(error: float, solves: float, within: float) -> list[Row]:
+    return [Row.once("goddard", "0.001", error=error, solves=solves, within=within, lines=36, ends=6)]
+
+
 def verdict_rows(*kinds: str, memory: float = 100.0) -> list[Row]:
     return [Row("zermelo", who, {"memory": [memory], "published": [1.0]}) for who in kinds]
 
 
 MET_AND_MISSED = [
+    ("curve", curve_rows(0.001, 20, 0.95), 0),
+    ("curve", curve_rows(0.0011, 20, 0.94), 2),
+    ("curve", curve_rows(0.001, 26, 0.95), 2),
     ("front", front_rows(1 / 1.2, 1.0), 0),
     ("front", front_rows(1 / 1.4, 1.0), 1),
     ("front", front_rows(1 / 1.4, 0.0), 0),
@@ -367,6 +381,27 @@ def test_the_corpus_stands_beside_an_earlier_run(monkeypatch, tmp_path, capsys):
     assert "slower by a fifth and 0.2 s: mine.py:build" in lines and any("right, before" in line for line in lines)
     for call, word in ((["corpus", "--against", "nowhere.csv"], "nowhere.csv"), (["zdt", "--problems", "x.py:y"], "--problems")):
         assert main(["bench", *call]) == 2 and word in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_curve_beside_points_that_are_solved_anew():
+    def corner() -> Problem:
+        problem = still("corner")
+        a, b = problem.parameter("a", bounds=(0, 1)), problem.parameter("b", bounds=(-1, 2))
+        problem.constraint("one", b - (1.0 - 1.6 * a), lower=0)
+        problem.constraint("two", b - (0.6 - 0.6 * a), lower=0)
+        problem.minimize("first", a)
+        problem.minimize("second", b)
+        return problem
+
+    case = curve.CurveCase("corner", corner, "dfet:1x2", error=1e-2)
+    (row,) = measured("curve", case, evaluations=5)
+    assert row.of("within") == 1.0 and row.of("farthest") <= row.of("error") <= 1e-2 and row.of("mesh") < 1e-6
+    # The corner is at 0.52 of the line between the ends: of 13 even points two are at 6/12 and 7/12, whose chord errs by 0.01003.
+    assert (
+        row.of("targets") == 5 and row.of("points") + 1 < row.of("points") - 2 + row.of("ends") <= row.of("solves") < row.of("lines") == 14
+    )
+    assert curve.finer(DFET(2, 3), case.build()).mesh_of("wait").edges == (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def test_peers_that_are_missing_are_named(monkeypatch):

@@ -5,6 +5,7 @@ import pytest
 
 from macs import Front, sweep
 from macs.fronts.curve import GAPS
+from macs.fronts.dataset import root_dataset
 from problems import load
 from problems.compiled import Objective
 from tests import synthetic_fronts
@@ -174,4 +175,7 @@ def test_a_front_of_a_problem_is_a_curve_also_from_its_file(tmp_path):
     curve, dense = found.curve(), sweep(problem, mesh, points=12, starts=1, verify=None)
     assert curve.distances(dense.objectives).max() <= curve.error < 2e-3
     found.save(tmp_path / "front.nc")
-    assert np.array_equal(Front.load(tmp_path / "front.nc").curve().sample(), curve.sample())
+    loaded = Front.load(tmp_path / "front.nc")
+    assert np.array_equal(loaded.curve().sample(), curve.sample())
+    assert np.array_equal(root_dataset(loaded)["curve_objectives"], curve.sample())
+    assert "curve_objectives" not in root_dataset(loaded[:1]).arrays

@@ -1,0 +1,117 @@
+"""Benchmark of fronts as curves: what a curve takes, and whether points that are solved anew lie within its estimated error."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from macs import sweep
+from macs.fronts.curve import FrontCurve, alone
+from macs.gradients.scalarised import Scalarised
+from macs.io.console import Steps
+from macs.refinement.places import KnownPoints
+from problems import Problem, load
+from transcription import Meshed, Transcription
+
+from .contract import SECONDS, Bench, Effort, Row, Target, column, finished
+from .searches import SearchCase, cart_pole
+
+COLUMNS = "points:.0f solves:.0f ends:.0f error:.1e targets:.0f within:.0% farthest:.1e lines:.0f mesh:.1e"
+"""Names and formats."""
+
+
+@dataclass(frozen=True)
+class CurveCase(SearchCase):
+    """A problem of two objectives, and the error that its curve is to have after at most so many solves."""
+
+    error: float = 1e-3
+    solves: int = 25
+
+
+def curve_rounds(given: CurveCase | str, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
+    """A round makes a front with its curve, then solves random targets anew, other ones in each round."""
+    case = given if isinstance(given, CurveCase) else CurveCase(given, partial(load, given))
+    problem, mesh = case.stated()
+    swept = partial(sweep, problem, starts=1, verify=None, progress=False)
+
+    def measured(number: int) -> Iterable[Row]:
+        began = time.perf_counter()
+        front = finished(swept(mesh, error=case.error))
+        curve, seconds = front.curve(), time.perf_counter() - began
+        known, places = KnownPoints(front), np.random.default_rng(number).random(effort.evaluations or 100)
+        lines = [curve.least + curve.ranges * [place, 1.0 - place] for place in places[~np.isnan(curve.at(places)[0])]]
+        anew = [one for one in known.solved(*(Scalarised(line, curve.ranges, units=known.units) for line in lines)) if one.row is None]
+        away = curve.distances(np.array([one.F for one in anew]) * front.signs)
+        # The curve through all of them stands for the front.
+        F, costates = np.array([*front.F, *(one.F for one in anew)]), [*front.costates, *(one.columns["costates"] for one in anew)]
+        good = [k for k in np.flatnonzero(alone(F, curve.ranges)) if costates[k] is not None]
+        exact = FrontCurve.through(front.goals, F[good], np.array([costates[k].weights for k in good]), [])
+        other = exact.distances(finished(swept(finer(mesh, problem), points=5, start=front)).objectives).max()
+        counts = {"points": len(front), "solves": front.stats["gradient_solves"], "ends": front.stats["solves_for"]["ends"]}
+        counts |= {"targets": len(anew), "lines": even_points(exact, case.error)}
+        errors = {"error": curve.error, "within": np.mean(away <= curve.error), "farthest": away.max(), "mesh": other}
+        yield Row.once(case.name, f"{case.error:g}", seconds=seconds, **counts, **errors)
+
+    return measured
+
+
+def finer(mesh: Transcription, problem: Problem) -> Meshed:
+    """The mesh with each element cut in two."""
+    assert isinstance(mesh, Meshed)
+    old = {name: mesh.mesh_of(name) for name in problem.phases}
+    halves = {name: np.interp(np.arange(2 * one.elements + 1) / 2, np.arange(one.elements + 1), one.edges) for name, one in old.items()}
+    return mesh.remeshed({name: replace(one, edges=tuple(halves[name])) for name, one in old.items()})
+
+
+def even_points(curve: FrontCurve, error: float) -> float:
+    """The least number of points in even steps along the line between the ends, whose straight lines err by less; NaN if too many."""
+    (start, _), (_, end) = curve.parts[0].interval, curve.parts[-1].interval
+    places = np.linspace(start, end, 4001)
+    heights, slopes, _ = curve.at(places)
+    for count in range(3, 500):
+        nodes = np.linspace(start, end, count)
+        nodes = nodes[~np.isnan(curve.at(nodes)[0])]
+        apart = np.abs(np.interp(places, nodes, curve.at(nodes)[0]) - heights) * np.sqrt(2.0 / (1.0 + slopes**2))
+        if np.nanmax(apart) < error:
+            return count
+    return np.nan
+
+
+def targets(rows: Sequence[Row]) -> list[Target]:
+    """What is asked of the error, of the solves, and of the targets."""
+    most, found = {case.name: case.solves for case in CASES}, list[Target]()
+    for row in rows:
+        solves, asked, error = row.of("solves"), most.get(row.case, np.inf), row.of("error")
+        others, met = row.of("lines") - 2 + row.of("ends"), error <= float(row.who) and solves <= asked
+        found += [
+            Target(row.case, f"an error of {row.who} from {asked} solves", f"{error:.1e} from {solves:.0f}", met),
+            Target(row.case, "95 % of the targets within", f"{row.of('within'):.0%}", row.of("within") >= 0.95),
+            Target(row.case, "half of the solves of lines", f"{solves:.0f} of {others:.0f}", 2 * solves <= others),
+        ]
+    return found
+
+
+CASES = (
+    CurveCase("goddard", partial(load, "goddard"), "dfet:6x6:bernstein", error=3e-4, solves=15),
+    CurveCase("orbit_rise", partial(load, "orbit_rise"), "dfet:10x5:bernstein", error=3e-4, solves=15),
+    CurveCase("cart-pole", cart_pole, "dfet:16x6:bernstein"),
+    CurveCase("skip", partial(load, "skip")),
+    CurveCase("reentry_case1", lambda: load("reentry_case1").with_objectives("cross-range", "heat load")),
+    CurveCase("smv", lambda: load("smv").with_objectives("terminal speed", "terminal mass")),
+)
+CURVE = Bench(
+    title="curve",
+    about="CURVE: `sweep(error=)` from one start, on one mesh: points, gradient solves, those for the ends, and the estimated error "
+    "of the curve in ranges of the objectives; of random targets, solved anew from the points beside, how many lie within it, and the "
+    "farthest. Lines: so many even points, with straight lines between them, have the error that is wanted; they take a solve each, and as "
+    "many for the ends. Mesh: how far five points on elements of half the length lie from the front.",
+    full=Effort(CASES),
+    quick=Effort(CASES[:1], evaluations=20),
+    prepare=curve_rounds,
+    columns=(*(column(name, "", name, form=form) for name, form in (one.split(":") for one in COLUMNS.split())), SECONDS),
+    targets=targets,
+)
