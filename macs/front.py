@@ -456,8 +456,8 @@ class Front(Points):
         """The front as a labelled Dataset, or that of one phase's trajectories: what `save` writes in the root or the phase's group.
 
         Each variable has its `long_name` and `units`. In a phase, each state, control and path constraint is a variable `(point, node)` of
-        its own name; a name that netCDF does not allow, or that the file needs itself, is changed, and remains as the `long_name`. A front
-        with a `curve` has places along it as `curve_objectives`.
+        its own name; a name that netCDF does not allow, or that the file needs itself, is changed, and remains as the `long_name`.
+        `curve_objectives` are places along the `curve`, if there is one.
 
         Raises
         ------

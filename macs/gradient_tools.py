@@ -389,13 +389,14 @@ class _Job:
 
     def swept(self, points: int, method: str, error: float | None) -> Front:
         """The front of a sweep, with so many points or a curve that errs by less; its ends alone if one of them was not found."""
+        found = list[Solved]()
         for _ in range(ENDS.from_rivals):
             ends, trace = lexicographic_ends(self.solver), None
             ranges = self.ranges(ends)
             if any(end.status != CONVERGED for end in ends):
                 return self.sifted(ends)
             if error is not None and ranges.all():
-                trace = CurveTrace(self.solver, ends, partial(self._weights, ranges=ranges), error)
+                trace = CurveTrace(self.solver, [*ends, *found], partial(self._weights, ranges=ranges), error)
                 found = trace.go()
             else:
                 found = solve_tasks(self.solver, tasks_between(np.array([end.F for end in ends]), ranges, points, method))

@@ -101,6 +101,8 @@ class _Run:
         for side, *more in ((0, 1, 2), (n - 1, n - 2, n - 3)) if n > 2 else ():
             if side in (i, i + 1):
                 rivals.append(self.through(side, *more[: 1 if side in self.inferred else 2], free=[side]))
+                # One whose slope the points contradict may lie where the front turns to it at once.
+                rivals += [self.side(more[0], more[1] - more[0])[0]] if side in self.inferred else []
         # Of two points alone: what one without either slope would be.
         rivals = rivals or [self.through(i, i + 1, free=[j]) for j in (i, i + 1)]
         return _apart(cubic, rivals, self.s[i], self.s[i + 1])

@@ -25,20 +25,21 @@ from .scalarised import Scalarised
 
 
 class CurveTrace:
-    """The points of a front of two objectives from its ends on, the gaps between them as pairs of points, and the curve through them; with
-    a function for the `weights` of a result, None where they are not known, and the error that is `wanted`."""
+    """The points of a front of two objectives from its ends on, the first ones `known`, the gaps between them as pairs of points, and the
+    curve through them; with a function for the `weights` of a result, None where they are not known, and the error that is `wanted`."""
 
-    def __init__(self, solver: MultistartSolver, ends: Sequence[Solved], weights: Callable[[Solved], Any], wanted: float) -> None:
-        self._solver, self._ends, self._weights, self.wanted = solver, ends, weights, wanted
-        self.found, self._tried, self.gaps = list(ends), list[tuple[float, float]](), list[tuple[Solved, Solved]]()
-        F = np.array([end.F for end in ends])
+    def __init__(self, solver: MultistartSolver, known: Sequence[Solved], weights: Callable[[Solved], Any], wanted: float) -> None:
+        self._solver, self._ends, self._weights, self.wanted = solver, known[:2], weights, wanted
+        self.found, self._tried, self.gaps = list(known), list[tuple[float, float]](), list[tuple[Solved, Solved]]()
+        F = np.array([end.F for end in self._ends])
         self._ranges = np.ptp(F, axis=0)
         self.curve = FrontCurve.through(solver.nlp.problem.goals, F, np.full((2, 2), np.nan), [])
 
     def go(self) -> list[Solved]:
         """All results, after points were solved until the curve errs by less than is wanted, or until there is nothing more to solve."""
-        places = (0.5 - 0.5 * np.cos(np.arange(1, 4) * np.pi / 4)).tolist()  # Chebyshev's
-        self._keep(places, solve_tasks(self._solver, [self._task(place) for place in places]))
+        if len(self.found) == 2:
+            places = (0.5 - 0.5 * np.cos(np.arange(1, 4) * np.pi / 4)).tolist()  # Chebyshev's
+            self._keep(places, solve_tasks(self._solver, [self._task(place) for place in places]))
         while (places := self._next()) and len(self.found) < LATTICE_SIZE and not stopping():
             self._solve(places)
         return self.found

@@ -73,8 +73,8 @@ def bench(
         effort = one.quick if quick else one.full
         effort = replace(effort, rounds=seeds) if seeds and one.seeded else effort
         effort = replace(effort, **studies) if one.kept else effort
-        chosen = [case for name in only for case in ([one for one in effort.cases if getattr(one, "name", one) == name] or [name])]
-        effort = replace(effort, cases=(*(chosen or effort.cases), *problems))
+        known = {getattr(case, "name", case): case for case in one.full.cases}
+        effort = replace(effort, cases=(*([known.get(name, name) for name in only] or effort.cases), *problems))
         interrupted = _measure(one, rows, effort)
         measured += [(kind, row) for row in rows]
         rows = [one for row in rows for one in (row, before.get(row.case)) if one is not None]

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -15,13 +16,12 @@ from macs.gradients.scalarised import Scalarised
 from macs.io.console import Steps
 from macs.refinement.places import KnownPoints
 from problems import Problem, load
-from transcription import Meshed, Transcription
+from transcription import Transcription
 
 from .contract import SECONDS, Bench, Effort, Row, Target, column, finished
 from .searches import SearchCase, cart_pole
 
 COLUMNS = "points:.0f solves:.0f ends:.0f error:.1e targets:.0f within:.0% farthest:.1e lines:.0f mesh:.1e"
-"""Names and formats."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class CurveCase(SearchCase):
 
 
 def curve_rounds(given: CurveCase | str, effort: Effort, steps: Steps) -> Callable[[int], Iterable[Row]]:
-    """A round makes a front with its curve, then solves random targets anew, other ones in each round."""
+    """A round makes a front with its curve, then solves random targets anew."""
     case = given if isinstance(given, CurveCase) else CurveCase(given, partial(load, given))
     problem, mesh = case.stated()
     swept = partial(sweep, problem, starts=1, verify=None, progress=False)
@@ -46,7 +46,6 @@ def curve_rounds(given: CurveCase | str, effort: Effort, steps: Steps) -> Callab
         lines = [curve.least + curve.ranges * [place, 1.0 - place] for place in places[~np.isnan(curve.at(places)[0])]]
         anew = [one for one in known.solved(*(Scalarised(line, curve.ranges, units=known.units) for line in lines)) if one.row is None]
         away = curve.distances(np.array([one.F for one in anew]) * front.signs)
-        # The curve through all of them stands for the front.
         F, costates = np.array([*front.F, *(one.F for one in anew)]), [*front.costates, *(one.columns["costates"] for one in anew)]
         good = [k for k in np.flatnonzero(alone(F, curve.ranges)) if costates[k] is not None]
         exact = FrontCurve.through(front.goals, F[good], np.array([costates[k].weights for k in good]), [])
@@ -59,21 +58,21 @@ def curve_rounds(given: CurveCase | str, effort: Effort, steps: Steps) -> Callab
     return measured
 
 
-def finer(mesh: Transcription, problem: Problem) -> Meshed:
+def finer(mesh: Any, problem: Problem) -> Transcription:
     """The mesh with each element cut in two."""
-    assert isinstance(mesh, Meshed)
     old = {name: mesh.mesh_of(name) for name in problem.phases}
-    halves = {name: np.interp(np.arange(2 * one.elements + 1) / 2, np.arange(one.elements + 1), one.edges) for name, one in old.items()}
-    return mesh.remeshed({name: replace(one, edges=tuple(halves[name])) for name, one in old.items()})
+    edges = {
+        name: np.insert(one.edges, range(1, one.elements + 1), np.convolve(one.edges, [0.5, 0.5], "valid")) for name, one in old.items()
+    }
+    return mesh.remeshed({name: replace(one, edges=tuple(edges[name])) for name, one in old.items()})
 
 
 def even_points(curve: FrontCurve, error: float) -> float:
     """The least number of points in even steps along the line between the ends, whose straight lines err by less; NaN if too many."""
-    (start, _), (_, end) = curve.parts[0].interval, curve.parts[-1].interval
-    places = np.linspace(start, end, 4001)
+    places = np.linspace(0.0, 1.0, 4001)
     heights, slopes, _ = curve.at(places)
     for count in range(3, 500):
-        nodes = np.linspace(start, end, count)
+        nodes = np.linspace(0.0, 1.0, count)
         nodes = nodes[~np.isnan(curve.at(nodes)[0])]
         apart = np.abs(np.interp(places, nodes, curve.at(nodes)[0]) - heights) * np.sqrt(2.0 / (1.0 + slopes**2))
         if np.nanmax(apart) < error:
@@ -105,10 +104,9 @@ CASES = (
 )
 CURVE = Bench(
     title="curve",
-    about="CURVE: `sweep(error=)` from one start, on one mesh: points, gradient solves, those for the ends, and the estimated error "
-    "of the curve in ranges of the objectives; of random targets, solved anew from the points beside, how many lie within it, and the "
-    "farthest. Lines: so many even points, with straight lines between them, have the error that is wanted; they take a solve each, and as "
-    "many for the ends. Mesh: how far five points on elements of half the length lie from the front.",
+    about="CURVE: `sweep(error=)` from one start, on one mesh: points, gradient solves, those for the ends, the estimated error in ranges of "
+    "the objectives; of random targets, solved anew, how many lie within it, and the farthest. Lines: even points with straight lines for the "
+    "wanted error, which take as many solves for ends. Mesh: how far five points on halved elements lie from the front.",
     full=Effort(CASES),
     quick=Effort(CASES[:1], evaluations=20),
     prepare=curve_rounds,

@@ -192,9 +192,6 @@ def bench(arguments: Namespace) -> int:
             raise WrongCall(f"--{option}: is for the corpus")
     if arguments.only and kind not in ("corpus", "curve"):
         raise WrongCall(f"problems are for the corpus and for curves, not for '{kind}'")
-    for name in arguments.only:
-        if name not in [getattr(case, "name", case) for case in BENCHES[kind].full.cases]:
-            load_problem(name)
     chosen = tuple(dict.fromkeys(arguments.solvers or ()))
     if chosen:
         if not kind:
@@ -212,7 +209,7 @@ def bench(arguments: Namespace) -> int:
         with wrong_call_on_value_error():
             header_of(kind, arguments.page, **settings)
     # A folder that contains something else, or that another process has locked; a file of something else.
-    with wrong_call_on_value_error() if arguments.keep or arguments.against else nullcontext():
+    with wrong_call_on_value_error() if arguments.keep or arguments.against or arguments.only else nullcontext():
         files = {"csv": arguments.csv, "page": arguments.page, "against": arguments.against}
         return DONE if measure(kinds, problems=arguments.problems, only=arguments.only, **files, **settings) else FAILED
 
