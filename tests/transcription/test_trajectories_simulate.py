@@ -1,9 +1,12 @@
 from dataclasses import replace
+from functools import partial
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 import pytest
-from cases import candidates, decay, integrator, oscillator, solved
+from cases import candidates, decay, integrator, oscillator, oscillator_rates, solved
+from scipy.integrate import solve_ivp
 
 from problems import Problem, load
 from transcription import DFET, PiecewisePolynomial, Trajectory
@@ -171,6 +174,26 @@ def test_a_control_that_overshoots_between_nodes_is_found_and_bernsteins_does_no
     assert simulated(nlp, z).violations["path 'push' of 'run'"] == pytest.approx(law.max() - 1.2, rel=1e-2)
     nlp, z = overshooting("bernstein")
     assert excursions(nlp.problem, nlp.unpack(z)) == {} and simulated(nlp, z).violation == 0
+
+
+@pytest.mark.parametrize("degree", [4, 14])
+def test_steps_are_as_exact_as_those_of_scipy_and_so_is_what_is_between(degree):
+    nlp = DFET(2, 4, control_order=degree).transcribe(oscillator())
+    flight = nlp.unpack(nlp.propagate(nlp.first_guess(candidates(nlp, 1)))[0])
+    planned, m = flight["swing"], flight.parameters["m"]
+    exact, rough = (simulate(nlp.problem, flight, rtol=rtol, atol=0.01 * rtol).trajectory["swing"] for rtol in (1e-12, 1e-6))
+    y = planned.edge_states[0]
+    for left, right in pairwise(planned.state.edges):
+        law = partial(planned.controls_on, int(left > planned.t0))
+
+        def rates(t, y, left=left, right=right, law=law):
+            return oscillator_rates(t, y, law(np.array([2 * (t - left) / (right - left) - 1]))[0], m, planned.tf)
+
+        inside = (exact.time >= left) & (exact.time <= right)
+        known = solve_ivp(rates, (left, right), y, "DOP853", rtol=1e-12, atol=1e-12, t_eval=exact.time[inside]).y.T
+        np.testing.assert_allclose(exact.states[inside], known, atol=1e-10)
+        assert 1e-12 < np.abs(rough.states[inside] - known).max() < 1e-5
+        y = known[-1]
 
 
 @pytest.mark.slow

@@ -263,7 +263,7 @@ def _transitions(phase: CompiledPhase, trajectory: PhaseTrajectory, parameters: 
     rtol, step = 1e-9, 1e-5  # a state is changed, in scales, by what the integrator resolves to four digits
     changed = np.vstack([np.zeros(nx), step * np.diag(scales)])
     starts = (trajectory.edge_states[:-1, None] + changed).reshape(-1, nx)
-    arcs = Arcs.of(phase, [(trajectory, j, parameters) for j in range(elements) for _ in range(nx + 1)])
+    arcs = Arcs.of(phase, [trajectory], [parameters]).alone(np.repeat(np.arange(elements), nx + 1))
     tolerances = 0.1 * rtol * np.concatenate([scales, np.ones(nothing.shape[1])])
-    ends = arcs.integrate(np.hstack([starts, nothing]), rtol, tolerances, "DOP853")[:, -1, :nx].reshape(elements, nx + 1, nx)
+    ends = arcs.integrate(np.hstack([starts, nothing]), rtol, tolerances, "DOP853")[0, :, -1, :nx].reshape(elements, nx + 1, nx)
     return ((ends[:, 1:] - ends[:, :1]) / (step * scales)).swapaxes(1, 2)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, solve_ivp
 
 from problems.compiled import CompiledPhase, remembered
 from problems.externals import reraise
@@ -25,6 +26,12 @@ METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")
 """Those that are implicit solve for all arcs in one dense system, so that each arc is integrated alone."""
 STIFF = "Radau"
 """The method for arcs on which an explicit one has used up `MOST_CALLS`."""
+FIRST_STEP = 0.25
+"""Of DOP853 on each element, of length 2: about what scipy's rule for it gives, which needs the rates twice."""
+STAGES, TERMS = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA]), 3 + len(DOP853.D)
+"""Of DOP853: where in a step its stages are, with the end and those for the interpolant, and how many terms that has."""
+POWERS = "powers"
+"""Basis of controls as sums of powers."""
 MOST_CALLS = 200_000
 """Evaluations of the dynamics on one element after which an integration by one method counts as broken down."""
 SIMULATION_GRACE = 1.0
@@ -33,123 +40,178 @@ SIMULATION_GRACE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Arcs:
-    """n arcs of one phase, each an element of a trajectory, with controls of one basis and degree."""
+    """Trajectories of one phase along N elements each, with controls of one basis and degree: n arcs side by side, then the next n."""
 
     phase: CompiledPhase
-    begins: np.ndarray  # begins, lengths: (n,): In time
+    begins: np.ndarray  # begins, lengths: (N, n): In time
     lengths: np.ndarray
-    coefficients: np.ndarray  # (n, degree + 1, nu): Of the controls
-    basis: str
-    s: np.ndarray  # (n, ns): t0, tf and the parameters of the trajectory
+    coefficients: np.ndarray  # (N, n, degree + 1, nu): Of the controls
+    basis: str  # of `polynomials.BASES`, or POWERS
+    s: np.ndarray  # (n, ns): t0, tf and the parameters of the trajectories
 
     @classmethod
-    def of(cls, phase: CompiledPhase, pieces: Sequence[tuple[PhaseTrajectory, int, np.ndarray]]) -> Arcs:
-        """Of (trajectory, element, parameters), with controls of one basis and degree."""
-        edges = np.array([one.state.edges[j : j + 2] for one, j, _ in pieces])
-        laws = np.array([one.control.coefficients[j] for one, j, _ in pieces])
-        s = np.array([[one.t0, one.tf, *parameters] for one, _, parameters in pieces])
-        return cls(phase, edges[:, 0], edges[:, 1] - edges[:, 0], laws, pieces[0][0].control.basis, s)
+    def of(cls, phase: CompiledPhase, planned: Sequence[PhaseTrajectory], parameters: Sequence[np.ndarray]) -> Arcs:
+        """Of trajectories with as many elements and controls of one basis and degree, each with its parameters."""
+        edges = np.stack([one.state.edges for one in planned], axis=1)
+        laws = np.stack([one.control.coefficients for one in planned], axis=1)
+        s = np.array([[one.t0, one.tf, *values] for one, values in zip(planned, parameters, strict=True)])
+        basis, degree = planned[0].control.basis, laws.shape[2] - 1
+        if degree <= 12:  # they cost a tenth of the time, and the digits that this loses are few
+            basis, laws = POWERS, monomials(basis, degree) @ laws
+        return cls(phase, edges[:-1], np.diff(edges, axis=0), laws, basis, s)
+
+    def alone(self, elements: np.ndarray | slice = slice(None)) -> Arcs:
+        """The elements of one trajectory, or some of them, side by side: each by itself."""
+        begins, lengths, laws = (one[elements].swapaxes(0, 1) for one in (self.begins, self.lengths, self.coefficients))
+        return Arcs(self.phase, begins, lengths, laws, self.basis, np.tile(self.s, (begins.shape[1], 1)))
 
     def integrate(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray:
-        """States and integrals along all arcs. y (n, ny), atol (ny,) -> (n, len(DENSE)."""
-        check_stopping(SIMULATION_GRACE)
-        found = np.full((len(y), len(DENSE), y.shape[1]), np.nan)
-        self._calls[0] = 0
-        able = np.flatnonzero(np.isfinite(y).all(axis=1))
-        if len(able):
-            rates = self._some(able)._rates(-1.0, y[able].ravel()).reshape(len(able), -1)
-            able = able[np.isfinite(rates).all(axis=1)]
-        groups = [able] if method in EXPLICIT else [able[k : k + 1] for k in range(len(able))]
-        while groups:
-            group = groups.pop()
-            arcs = self._some(group)
-            values = arcs._integrated(y[group], rtol, atol, method) if len(group) else None
-            if values is None and len(group) == 1 and method in EXPLICIT and arcs._calls[0] > MOST_CALLS:
-                # Stiff: the steps of an explicit method are as short as its fastest decay, those of an implicit one as the solution lets.
-                arcs._calls[0] = 0
-                values = arcs._integrated(y[group], rtol, atol, STIFF)
-            if values is not None:
-                found[group] = values
-            elif len(group) > 1:
-                # One that breaks down takes the others with it: look for it.
-                groups += np.array_split(group, 2)
+        """States and integrals (N, n, len(DENSE), ny) along all elements, from y (n, ny). atol (ny,)."""
+        found = np.full((len(self.begins), len(y), len(DENSE), y.shape[1]), np.nan)
+        for j, values in enumerate(found):
+            check_stopping(SIMULATION_GRACE)
+            able = np.flatnonzero(np.isfinite(y).all(axis=1))
+            groups = [able] if method in EXPLICIT else [able[k : k + 1] for k in range(len(able))]
+            while groups:
+                if not len(group := groups.pop()):
+                    continue
+                arcs = self._some(group)
+                own = arcs._on_element(j, y[group], rtol, atol, method)
+                if own is None and len(group) == 1 and method in EXPLICIT and arcs._calls[0] > MOST_CALLS:
+                    # Stiff: the steps of an explicit method are as short as its fastest decay.
+                    own = arcs._on_element(j, y[group], rtol, atol, STIFF)
+                if own is not None:
+                    values[group] = own
+                elif len(group) > 1:
+                    # One that breaks down takes the others with it: look for it.
+                    groups += np.array_split(group, 2)
+            y = values[:, -1]
         return found
 
     def _some(self, rows: np.ndarray) -> Arcs:
-        """The arcs of `rows`, in their order: itself, with its rates, if these are all."""
-        if len(rows) == len(self.begins):
+        """The arcs of `rows`, in their order: itself, with its functions, if these are all."""
+        if len(rows) == len(self.s):
             return self
-        return Arcs(self.phase, self.begins[rows], self.lengths[rows], self.coefficients[rows], self.basis, self.s[rows])
+        begins, lengths, laws = (one[:, rows] for one in (self.begins, self.lengths, self.coefficients))
+        return Arcs(self.phase, begins, lengths, laws, self.basis, self.s[rows])
 
-    def _integrated(self, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray | None:
-        """All together; None if the integration breaks down."""
+    def _on_element(self, j: int, y: np.ndarray, rtol: float, atol: np.ndarray, method: str) -> np.ndarray | None:
+        """All together, (n, len(DENSE), ny); None if the integration breaks down."""
         n, ny = y.shape
         # The integrator bounds the mean square over all arcs, of which any one may have as much of the error as this leaves it.
         share = np.sqrt(n)
-        options = {"rtol": max(rtol / share, 3e-14), "atol": np.tile(atol / share, n), "t_eval": DENSE}
+        rtol, atol = max(rtol / share, 3e-14), atol / share
+        self._calls[0] = 0
         try:
             # What grows beyond all numbers is a break down, which is reported as such, and no warning of numpy's.
             with np.errstate(over="ignore", invalid="ignore"):
-                solution = solve_ivp(self._rates, (-1.0, 1.0), y.ravel(), method=method, **options)
+                if method == "DOP853":
+                    return self._stepped(j, y, rtol, atol)
+                rates = self._rates(j)
+                if not np.isfinite(rates(-1.0, y.ravel())).all():
+                    return None
+                options = {"rtol": rtol, "atol": np.tile(atol, n), "t_eval": DENSE}
+                solution = solve_ivp(rates, (-1.0, 1.0), y.ravel(), method=method, **options)
         except (ArithmeticError, ValueError, np.linalg.LinAlgError):
             # The implicit methods raise where rates are no numbers; so do ours after too many evaluations.
             return None
         return solution.y.T.reshape(len(DENSE), n, ny).swapaxes(0, 1) if solution.success else None
+
+    def _stepped(self, j: int, y: np.ndarray, rtol: float, atol: np.ndarray) -> np.ndarray | None:
+        """See `_on_element`: by the steps, errors and interpolants of scipy's DOP853, whose stages are one call of a Function. With a call
+        for each, most of the time is Python's."""
+        (known, u, times, step_in_time, out), evaluate = self._steps
+        known[:], half = y, 0.5 * self.lengths[j]
+        tau, step, most, taus, parts = -1.0, FIRST_STEP, 10.0, list[float](), list[np.ndarray]()
+        while tau < 1.0:
+            last = tau + step >= 1.0
+            step = 1.0 - tau if last else step
+            self._count(len(STAGES))
+            if step < 10.0 * math.ulp(tau):
+                return None
+            places = tau + step * STAGES
+            u[:], times[:] = self._controls(j, places), self.begins[j] + np.outer(places + 1.0, half)
+            step_in_time[:] = half * step
+            evaluate()
+            scale = atol + rtol * np.maximum(np.abs(known), np.abs(known + out[0]))
+            fifth, third = ((out[TERMS:] / scale) ** 2).sum(axis=(1, 2)).tolist()
+            error = fifth / math.sqrt((fifth + 0.01 * third) * known.size) if fifth else 0.0
+            error = error if math.isfinite(fifth + third) else math.inf
+            change = 0.9 * error**-0.125 if error else most
+            if error < 1.0:
+                taus, parts = [*taus, tau], [*parts, np.concatenate([known[None], out[:TERMS]])]
+                known += out[0]
+                tau, step, most = 1.0 if last else tau + step, step * min(change, most), 10.0
+            else:  # or no number
+                step, most = step * max(0.2, change), 1.0
+        begun = np.array(taus)
+        which = np.searchsorted(begun, DENSE, side="right") - 1
+        x = (DENSE - begun[which]) / np.diff(np.append(begun, 1.0))[which]
+        shares = np.cumprod([np.ones(len(x)), *(1.0 - x if k % 2 else x for k in range(TERMS))], axis=0)
+        return np.einsum("kt,tkny->nty", shares, np.array(parts)[which])
+
+    @cached_property
+    def _steps(self) -> tuple[tuple[np.ndarray, ...], Callable[[], None]]:
+        """Arrays that a step reads and writes, and the step."""
+        n, (nx, nu, integrals), k = len(self.s), _sizes(self.phase), len(STAGES)
+        y, u, times, h = (np.zeros(size) for size in ((n, nx + integrals), (k, n, nu), (k, n), n))
+        out = np.zeros((TERMS + 2, n, nx + integrals))
+        return (y, u, times, h, out), _in_place(_step_function(self.phase, n), (y, u, times, np.array(self.s, dtype=float), h), out)
 
     @cached_property
     def _calls(self) -> list[int]:
         """Number of evaluations of the rates since the last integration began."""
         return [0]
 
-    @cached_property
-    def _rates(self) -> Callable[[float, np.ndarray], np.ndarray]:
-        """(tau, y (n * ny,)) -> rates by the local coordinate, called through buffers: some thousand calls a trajectory."""
-        n, nx, nu = len(self.begins), len(self.phase.states), len(self.phase.controls)
-        function, degree = _rate_function(self.phase, n), self.coefficients.shape[1] - 1
-        laws = np.ascontiguousarray(self.coefficients.swapaxes(0, 1)).reshape(degree + 1, n * nu)
-        # As sums of powers they cost a tenth of the time; up to this degree the digits that this loses are few.
-        law = monomials(self.basis, degree) @ laws if degree <= 12 else None
-        exponents, line = np.arange(degree + 1), np.ones(2)
-        half, half_of_each = 0.5 * self.lengths[:, None], 0.5 * self.lengths
-        x, u, time = np.zeros((n, nx)), np.zeros((n, nu)), np.zeros(n)
-        out = np.zeros((n, function.size1_out(0)))
-        arguments = x, u, time, np.array(self.s, dtype=float)
-        buffer, trigger = function.buffer()
-        for i, argument in enumerate(arguments):
-            buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type,call-arg]
-        buffer.set_res(0, memoryview(out))  # type: ignore[arg-type,call-arg]
-        controls, basis, begins = self.phase.controls, self.basis, self.begins
-        periodic, calls = any(v.period for v in controls), self._calls
-        flat_x, flat_u = x.ravel(), u.ravel()
+    def _count(self, more: int) -> None:
+        """Count evaluations of the rates: too many raise ArithmeticError, and now and then it is asked whether the work is to end."""
+        before, self._calls[0] = self._calls[0], self._calls[0] + more
+        if self._calls[0] > MOST_CALLS:
+            raise ArithmeticError("too many evaluations of the dynamics")
+        if self._calls[0] // 100 > before // 100:  # some hundredths of a second
+            check_stopping(SIMULATION_GRACE)
 
-        def rates(tau: float, y: np.ndarray, _alive: object = (buffer, arguments)) -> np.ndarray:
-            # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.
-            calls[0] += 1
-            if calls[0] > MOST_CALLS:
-                raise ArithmeticError("too many evaluations of the dynamics")
-            if not calls[0] % 100:  # some hundredths of a second
-                check_stopping(SIMULATION_GRACE)
-            # Written into place: an operation of numpy on a few numbers takes longer than the dynamics.
-            if n == 1:
-                flat_x[:] = y[:nx]
-            else:
-                x[:] = y.reshape(n, -1)[:, :nx]
-            np.multiply(half_of_each, tau + 1.0, out=time)
-            np.add(begins, time, out=time)
-            if law is None:
-                u[:] = (basis_matrix(basis, degree, np.array([tau])) @ laws).reshape(n, nu)
-            elif degree == 1:
-                line[1] = tau
-                np.matmul(line, law, out=flat_u)
-            else:
-                np.matmul(tau**exponents, law, out=flat_u)
-            if periodic:
-                u[:] = wrapped(u, controls)
-            trigger()
-            reraise()
-            return (half * out).ravel()
+    def _controls(self, j: int, places: np.ndarray) -> np.ndarray:
+        """Controls (k, n, nu) at local coordinates (k,) of element j."""
+        laws, degree = self.coefficients[j], self.coefficients.shape[2] - 1
+        values = places[:, None] ** np.arange(degree + 1) if self.basis == POWERS else basis_matrix(self.basis, degree, places)
+        return wrapped((values @ laws).swapaxes(0, 1), self.phase.controls)
+
+    def _rates(self, j: int) -> Callable[[float, np.ndarray], np.ndarray]:
+        """(tau, y (n * ny,)) -> rates by the local coordinate on element j, called through buffers."""
+        n, (nx, nu, integrals) = len(self.s), _sizes(self.phase)
+        begins, half = self.begins[j], 0.5 * self.lengths[j]
+        x, u, time, out = np.zeros((n, nx)), np.zeros((n, nu)), np.zeros(n), np.zeros((n, nx + integrals))
+        evaluate = _in_place(_rate_function(self.phase, n), (x, u, time, np.array(self.s, dtype=float)), out)
+
+        def rates(tau: float, y: np.ndarray) -> np.ndarray:
+            self._count(1)
+            x[:], u[:] = y.reshape(n, -1)[:, :nx], self._controls(j, np.array([tau]))[0]
+            time[:] = begins + half * (tau + 1.0)
+            evaluate()
+            return (half[:, None] * out).ravel()
 
         return rates
+
+
+def _sizes(phase: CompiledPhase) -> tuple[int, int, int]:
+    """Numbers of states, controls and integrals."""
+    return len(phase.states), len(phase.controls), phase.integrands.size1_out(0)
+
+
+def _in_place(function: ca.Function, arguments: Sequence[np.ndarray], out: np.ndarray) -> Callable[[], None]:
+    """A call of a Function that reads arrays and writes into another one."""
+    buffer, trigger = function.buffer()
+    for i, argument in enumerate(arguments):
+        buffer.set_arg(i, memoryview(argument))  # type: ignore[arg-type,call-arg]
+    buffer.set_res(0, memoryview(out))  # type: ignore[arg-type,call-arg]
+
+    def evaluate(_alive: object = (buffer, arguments, out)) -> None:
+        # The buffer holds bare addresses: `_alive` keeps what they point to as long as this function lives.
+        trigger()
+        reraise()
+
+    return evaluate
 
 
 @remembered
@@ -159,3 +221,22 @@ def _rate_function(phase: CompiledPhase, n: int) -> ca.Function:
     rates = ca.vertcat(phase.dynamics(*inputs), phase.integrands(*inputs))
     function = expanded(ca.Function("rates", inputs, [ca.densify(rates)]))
     return mapped(function, n) if n > 1 else function
+
+
+@remembered
+def _step_function(phase: CompiledPhase, n: int) -> ca.Function:
+    """(y, u and times at the stages, s, step in time) -> terms of the interpolant, the first of which is the change of y, and two errors,
+    a column each; of n arcs, at one stage after the other."""
+    rates, (nx, nu, integrals), k = _rate_function(phase, n), _sizes(phase), len(STAGES)
+    sizes = {"y": (nx + integrals, n), "u": (nu, n * k), "t": (1, n * k), "s": rates.size_in(3), "h": (1, n)}
+    y, u, t, s, h = inputs = [ca.MX.sym(name, *size) for name, size in sizes.items()]
+    factors, slopes = ca.repmat(h, nx + integrals, 1), ca.MX(y.numel(), 0)
+    for i, weights in enumerate([*DOP853.A, DOP853.B, *DOP853.A_EXTRA]):
+        x = y + ca.reshape(slopes @ weights[:i], *y.shape) if i else y
+        some = slice(i * n, (i + 1) * n)
+        slopes = ca.horzcat(slopes, ca.vec(factors * rates(x[:nx, :], u[:, some], t[:, some], s)))
+    first, change, last = slopes[:, 0], slopes[:, :12] @ DOP853.B, slopes[:, 12]
+    terms = [change, first - change, 2.0 * change - first - last, slopes @ DOP853.D.T]
+    errors = [slopes[:, :13] @ weights for weights in (DOP853.E5, DOP853.E3)]
+    step = ca.Function("step", inputs, [ca.densify(ca.horzcat(*terms, *errors))])
+    return step if n > 1 else expanded(step)

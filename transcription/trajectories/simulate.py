@@ -1,4 +1,4 @@
-"""Independent simulation of trajectories: their controls under an integrator of scipy, which knows nothing of the transcription."""
+"""Independent simulation of trajectories: their controls under integrators of scipy, which know nothing of the transcription."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Simulation:
 def simulate(
     problem: CompiledProblem, trajectory: Trajectory, *, rtol: float = 1e-9, atol: float = 1e-10, method: str = "DOP853"
 ) -> Simulation:
-    """The simulation of a trajectory's controls by an integrator of scipy; a linked phase starts where the one before it ended."""
+    """The simulation of a trajectory's controls by an integrator as of scipy; a linked phase starts where the one before it ended."""
     return simulate_all(problem, [trajectory], rtol=rtol, atol=atol, method=method)[0]
 
 
@@ -116,8 +116,8 @@ def simulate_elements(problem: CompiledProblem, trajectory: Trajectory, *, rtol:
         planned = trajectory[phase.name]
         nx, integrals = len(phase.states), np.zeros((len(planned.state.coefficients), phase.integrands.size1_out(0)))
         tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
-        arcs = Arcs.of(phase, [(planned, j, parameters) for j in range(len(integrals))])
-        elements = arcs.integrate(np.hstack([planned.edge_states[:-1], integrals]), rtol, tolerances, "DOP853")
+        arcs = Arcs.of(phase, [planned], [parameters]).alone()
+        (elements,) = arcs.integrate(np.hstack([planned.edge_states[:-1], integrals]), rtol, tolerances, "DOP853")
         elements[1:, :, nx:] += np.cumsum(elements[:-1, -1:, nx:], axis=0)
         simulated[i] = _simulated_phase(phase, planned, elements, parameters)
         violations |= simulated[i].violations(phase)
@@ -132,9 +132,9 @@ def defect_of_elements(problem: CompiledProblem, trajectory: Trajectory, most: i
         known = planned.edge_states
         rows = np.unique(np.linspace(0, len(known) - 2, min(len(known) - 1, most)).astype(int))
         integrals, spans = np.zeros((len(rows), phase.integrands.size1_out(0))), np.array([v.span for v in phase.states])
-        arcs = Arcs.of(phase, [(planned, j, parameters) for j in rows.tolist()])
+        arcs = Arcs.of(phase, [planned], [parameters]).alone(rows)
         tolerances = atol * np.append(spans, np.ones(integrals.shape[1]))
-        ends = arcs.integrate(np.hstack([known[rows], integrals]), rtol, tolerances, "DOP853")[:, -1, :nx]
+        ends = arcs.integrate(np.hstack([known[rows], integrals]), rtol, tolerances, "DOP853")[0, :, -1, :nx]
         found.append((np.abs(ends - known[rows + 1]) / spans).max())
     return float(np.max(found))
 
@@ -150,12 +150,8 @@ def _side_by_side(problem: CompiledProblem, trajectories: Sequence[Trajectory], 
         starts = np.array([_start(problem, i, *one) for one in zip(planned, simulated, violations, strict=True)])
         integrals = np.zeros((len(planned), phase.integrands.size1_out(0)))
         tolerances = atol * np.array([*(v.span for v in phase.states), *np.ones(integrals.shape[1])])
-        y, elements = np.hstack([starts, integrals]), []
-        for j in range(len(planned[0].state.edges) - 1):
-            arcs = Arcs.of(phase, [(one, j, values) for one, values in zip(planned, parameters, strict=True)])
-            elements.append(arcs.integrate(y, rtol, tolerances, method))
-            y = elements[-1][:, -1]
-        for k, one in enumerate(zip(planned, np.array(elements).swapaxes(0, 1), parameters, strict=True)):
+        elements = Arcs.of(phase, planned, parameters).integrate(np.hstack([starts, integrals]), rtol, tolerances, method)
+        for k, one in enumerate(zip(planned, elements.swapaxes(0, 1), parameters, strict=True)):
             simulated[k][i] = _simulated_phase(phase, *one)
             violations[k] |= simulated[k][i].violations(phase)
     return [_simulation(problem, *one) for one in zip(simulated, violations, trajectories, parameters, strict=True)]
