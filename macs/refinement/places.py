@@ -247,8 +247,8 @@ class KnownPoints:
         points = self.found(found)
         points = points[best_rows(points)]
         points = points[separate(points.F, self.units)].sorted()
-        missing = n - len(points)
-        return points.replace(message=f"{missing} of {n} places have no point of their own." if missing else "")
+        counts = {"were not begun": len(waiting), "have no point of their own": n - len(points) - len(waiting)}
+        return points.replace(message="; ".join(f"{count} of {n} places {what}" for what, count in counts.items() if count > 0))
 
     def _farthest(self, tasks: Sequence[Scalarised]) -> list[int]:
         """The tasks of the next batch: in turn that whose place is farthest from all points and places before."""

@@ -83,12 +83,14 @@ def _gain(
     adjoint = costates(t)  # they may have other pieces
 
     tried = np.stack([u, *_others(phase, u)], axis=1)
-    values, paths, peaks = _compared(phase, tried, adjoint, weights, x, t, s)
+    k, p, _ = tried.shape
+    (found,) = _comparison(phase, p)(adjoint, np.tile(weights, (k, 1)), x, tried, t, np.tile(s, (k, 1)))
+    values, paths, peaks = np.split(found.reshape(k, p, -1), [1, 1 + len(phase.paths)], axis=2)
     highest = peaks[:, 0].max(axis=0)
     clear = _clear(phase, x, paths[:, 0], peaks[:, 0], highest)
     lower, upper = (np.array([getattr(limit, side) for limit in phase.paths]) for side in ("lower", "upper"))
     allowed = ((lower <= paths) & (paths <= upper)).all(axis=2) & (peaks <= highest).all(axis=2)
-    less, own = values[:, :1] - values, np.arange(len(t))
+    less, own = (values[:, :1] - values)[:, :, 0], np.arange(k)
     less[~(allowed & (less > 0.0))] = 0.0  # or no number
     chosen = less.argmax(axis=1)
     best, least = less[own, chosen], tried[own, chosen]
@@ -97,22 +99,6 @@ def _gain(
     jumps = np.abs(np.diff(least.reshape(*shape, -1), axis=1)) > 0.5 * np.array([v.span for v in phase.controls])
     middles = 0.5 * (TAU[1:] + TAU[:-1])
     return Gain(amounts, [middles[one] for one in np.any(jumps, axis=2)])
-
-
-def _compared(
-    phase: CompiledPhase,
-    controls: np.ndarray,
-    costates: np.ndarray,
-    weights: np.ndarray,
-    x: np.ndarray,
-    t: np.ndarray,
-    s: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Hamiltonians (k, p), path constraints (k, p, paths) and peaks (k, p, peaks) of p controls (k, p, nu) at each of k places."""
-    (k, p, _), paths = controls.shape, phase.path.numel_out()
-    (found,) = _comparison(phase, p)(costates, np.tile(weights, (k, 1)), x, controls, t, np.tile(s, (k, 1)))
-    found = found.reshape(k, p, -1)
-    return found[:, :, 0], found[:, :, 1 : 1 + paths], found[:, :, 1 + paths :]
 
 
 @remembered

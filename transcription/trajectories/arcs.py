@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
@@ -48,6 +48,7 @@ class Arcs:
     coefficients: np.ndarray  # (N, n, degree + 1, nu): Of the controls
     basis: str  # of `polynomials.BASES`, or POWERS
     s: np.ndarray  # (n, ns): t0, tf and the parameters of the trajectories
+    _calls: list[int] = field(default_factory=lambda: [0])  # evaluations of the rates since the last integration began
 
     @classmethod
     def of(cls, phase: CompiledPhase, planned: Sequence[PhaseTrajectory], parameters: Sequence[np.ndarray]) -> Arcs:
@@ -71,11 +72,9 @@ class Arcs:
         for j, values in enumerate(found):
             check_stopping(SIMULATION_GRACE)
             able = np.flatnonzero(np.isfinite(y).all(axis=1))
-            groups = [able] if method in EXPLICIT else [able[k : k + 1] for k in range(len(able))]
+            groups = [able][: len(able)] if method in EXPLICIT else [able[k : k + 1] for k in range(len(able))]
             while groups:
-                if not len(group := groups.pop()):
-                    continue
-                arcs = self._some(group)
+                arcs = self._some(group := groups.pop())
                 own = arcs._on_element(j, y[group], rtol, atol, method)
                 if own is None and len(group) == 1 and method in EXPLICIT and arcs._calls[0] > MOST_CALLS:
                     # Stiff: the steps of an explicit method are as short as its fastest decay.
@@ -99,8 +98,7 @@ class Arcs:
         """All together, (n, len(DENSE), ny); None if the integration breaks down."""
         n, ny = y.shape
         # The integrator bounds the mean square over all arcs, of which any one may have as much of the error as this leaves it.
-        share = np.sqrt(n)
-        rtol, atol = max(rtol / share, 3e-14), atol / share
+        rtol, atol = max(rtol / np.sqrt(n), 3e-14), atol / np.sqrt(n)
         self._calls[0] = 0
         try:
             # What grows beyond all numbers is a break down, which is reported as such, and no warning of numpy's.
@@ -118,14 +116,12 @@ class Arcs:
         return solution.y.T.reshape(len(DENSE), n, ny).swapaxes(0, 1) if solution.success else None
 
     def _stepped(self, j: int, y: np.ndarray, rtol: float, atol: np.ndarray) -> np.ndarray | None:
-        """See `_on_element`: by the steps, errors and interpolants of scipy's DOP853, whose stages are one call of a Function. With a call
-        for each, most of the time is Python's."""
+        """See `_on_element`: by the steps, errors and interpolants of scipy's DOP853, whose stages are one call of a Function."""
         (known, u, times, step_in_time, out), evaluate = self._steps
         known[:], half = y, 0.5 * self.lengths[j]
         tau, step, most, taus, parts = -1.0, FIRST_STEP, 10.0, list[float](), list[np.ndarray]()
         while tau < 1.0:
-            last = tau + step >= 1.0
-            step = 1.0 - tau if last else step
+            step, last = min(step, 1.0 - tau), tau + step >= 1.0
             self._count(len(STAGES))
             if step < 10.0 * math.ulp(tau):
                 return None
@@ -153,15 +149,10 @@ class Arcs:
     @cached_property
     def _steps(self) -> tuple[tuple[np.ndarray, ...], Callable[[], None]]:
         """Arrays that a step reads and writes, and the step."""
-        n, (nx, nu, integrals), k = len(self.s), _sizes(self.phase), len(STAGES)
-        y, u, times, h = (np.zeros(size) for size in ((n, nx + integrals), (k, n, nu), (k, n), n))
-        out = np.zeros((TERMS + 2, n, nx + integrals))
+        n, ny, k = len(self.s), len(self.phase.states) + self.phase.integrands.numel_out(), len(STAGES)
+        y, u, times, h = (np.zeros(size) for size in ((n, ny), (k, n, len(self.phase.controls)), (k, n), n))
+        out = np.zeros((TERMS + 2, n, ny))
         return (y, u, times, h, out), _in_place(_step_function(self.phase, n), (y, u, times, np.array(self.s, dtype=float), h), out)
-
-    @cached_property
-    def _calls(self) -> list[int]:
-        """Number of evaluations of the rates since the last integration began."""
-        return [0]
 
     def _count(self, more: int) -> None:
         """Count evaluations of the rates: too many raise ArithmeticError, and now and then it is asked whether the work is to end."""
@@ -179,9 +170,9 @@ class Arcs:
 
     def _rates(self, j: int) -> Callable[[float, np.ndarray], np.ndarray]:
         """(tau, y (n * ny,)) -> rates by the local coordinate on element j, called through buffers."""
-        n, (nx, nu, integrals) = len(self.s), _sizes(self.phase)
+        n, nx, nu = len(self.s), len(self.phase.states), len(self.phase.controls)
         begins, half = self.begins[j], 0.5 * self.lengths[j]
-        x, u, time, out = np.zeros((n, nx)), np.zeros((n, nu)), np.zeros(n), np.zeros((n, nx + integrals))
+        x, u, time, out = (np.zeros(size) for size in ((n, nx), (n, nu), n, (n, nx + self.phase.integrands.numel_out())))
         evaluate = _in_place(_rate_function(self.phase, n), (x, u, time, np.array(self.s, dtype=float)), out)
 
         def rates(tau: float, y: np.ndarray) -> np.ndarray:
@@ -192,11 +183,6 @@ class Arcs:
             return (half[:, None] * out).ravel()
 
         return rates
-
-
-def _sizes(phase: CompiledPhase) -> tuple[int, int, int]:
-    """Numbers of states, controls and integrals."""
-    return len(phase.states), len(phase.controls), phase.integrands.size1_out(0)
 
 
 def _in_place(function: ca.Function, arguments: Sequence[np.ndarray], out: np.ndarray) -> Callable[[], None]:
@@ -227,10 +213,10 @@ def _rate_function(phase: CompiledPhase, n: int) -> ca.Function:
 def _step_function(phase: CompiledPhase, n: int) -> ca.Function:
     """(y, u and times at the stages, s, step in time) -> terms of the interpolant, the first of which is the change of y, and two errors,
     a column each; of n arcs, at one stage after the other."""
-    rates, (nx, nu, integrals), k = _rate_function(phase, n), _sizes(phase), len(STAGES)
-    sizes = {"y": (nx + integrals, n), "u": (nu, n * k), "t": (1, n * k), "s": rates.size_in(3), "h": (1, n)}
+    rates, nx, ny, k = _rate_function(phase, n), len(phase.states), _rate_function(phase, 1).numel_out(), len(STAGES)
+    sizes = {"y": (ny, n), "u": (len(phase.controls), n * k), "t": (1, n * k), "s": rates.size_in(3), "h": (1, n)}
     y, u, t, s, h = inputs = [ca.MX.sym(name, *size) for name, size in sizes.items()]
-    factors, slopes = ca.repmat(h, nx + integrals, 1), ca.MX(y.numel(), 0)
+    factors, slopes = ca.repmat(h, ny, 1), ca.MX(y.numel(), 0)
     for i, weights in enumerate([*DOP853.A, DOP853.B, *DOP853.A_EXTRA]):
         x = y + ca.reshape(slopes @ weights[:i], *y.shape) if i else y
         some = slice(i * n, (i + 1) * n)

@@ -118,6 +118,10 @@ def test_between_two_valleys_the_better_one_counts(s):
     assert valleys().at({"place": s}).objectives["cost"] == pytest.approx(least_cost(s), abs=1e-6)
 
 
+def test_places_that_were_not_begun_are_said_to_be_that():
+    assert front().dense(33, time_limit=1e-9).message == "31 of 33 places were not begun"
+
+
 def test_a_dense_front_of_two_valleys():
     dense = valleys().dense(21)
     assert len(dense) == 21
