@@ -12,7 +12,7 @@ from problems.vector import CompiledVectorProblem
 from transcription.base import NLP
 from transcription.meshes.minimum import OptimumMultipliers, gains
 from transcription.nlp.elastic import opposing
-from transcription.nlp.optimality import NEGLIGIBLE, Conditions, Multipliers, costates
+from transcription.nlp.optimality import Conditions, Multipliers, costates
 from transcription.nlp.program import nlp_scales
 from transcription.stopping import Stopped, check_stopping
 from transcription.trajectories.limits import excursions
@@ -91,7 +91,7 @@ def _certificate(nlp: NLP, z: np.ndarray, ranges: np.ndarray | None, sole: np.nd
         some = None if sole is None else _alone(nlp, z, ranges, sole, conditions)
         known = [one for one in (some, conditions) if one is not None]
         # With so small a residual of the objectives asked for that of all is not sought: it is hardly less, and takes as long.
-        small = next((one.residual for one in known if one.residual <= NEGLIGIBLE), None)
+        small = next((one.residual for one in known if one.residual <= 1e-6), None)
         optimality = min((one.residual for one in known), default=np.inf) if small is None else small
         feasible = nlp.evaluate(z[None])[1][0] <= CERTIFIED
         best = next((one for one in known if feasible and one.residual <= CERTIFIED), None)

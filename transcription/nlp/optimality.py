@@ -26,8 +26,6 @@ DEPENDENT = 1e-12
 """Weight of dependent variables, where a free one has 1: small enough to be nothing, large enough that all multipliers are determined."""
 MOST_BEYOND = 50
 """Equations beyond those of the states for which these are eliminated: each takes a solve, and a column of a dense system."""
-NEGLIGIBLE = 1e-6
-"""Residual of the conditions of optimality up to which no lesser one is sought."""
 SMALL_MULTIPLIERS = 1e-6
 """What a multiplier of a state's limit or of a row counts as a residual of its own where the smallest ones are wanted: far less than any
 that the residual asks for, far more than round-off."""
@@ -126,20 +124,10 @@ class Conditions:
 
     @cached_property
     def residual(self) -> float:
-        """That of `optimality`, or of multipliers that are wanted anyway where it is negligible: the least is hardly less."""
         try:
-            found, m = self._first, len(self.linear.of_objectives)
-            own = float(np.linalg.norm(np.concatenate([self.reduced @ found, self.linear.slack * found[m:]])))
-            return own if own <= NEGLIGIBLE else _least(self.reduced, self.linear.slack)[0]
+            return _least(self.reduced, self.linear.slack)[0]
         except (RuntimeError, np.linalg.LinAlgError):
             return np.inf
-
-    @cached_property
-    def _first(self) -> np.ndarray:
-        """Multipliers of objectives and inequalities with nearly the least residual, of which those of objectives are the weights."""
-        # Where a front bends sharply, as that of a flight with hundreds of active limits does, weights would be off by a hundredth with all
-        # of the smallness; they are by the square of this part less.
-        return _least(self.reduced, self.linear.slack, 0.1 * self._others())[1]
 
     def residual_of(self, mixtures: np.ndarray) -> float:
         """The least residual of weights that are mixtures of those in the columns (used, p), which are not negative and each of sum 1."""
@@ -156,11 +144,13 @@ class Conditions:
         Where limits depend on each other they are not unique, and round-off would choose: the smallest are taken, and of limits of free
         variables rather than others, first the weights of the objectives, then the multipliers that belong to them.
         """
-        m, slack = len(self.linear.of_objectives), self.linear.slack
+        m, slack, small = len(self.linear.of_objectives), self.linear.slack, SMALL_MULTIPLIERS * np.concatenate(self._others())
         try:
-            weights, guess = np.split(self._first, [m])
+            # Where a front bends sharply, as that of a flight with hundreds of active limits does, weights would be off by a hundredth with
+            # all of `small`; they are by the square of this part less.
+            weights = _least(self.reduced, slack, 0.1 * small)[1][:m] if m > 1 else np.ones(m)
             weighted = np.column_stack([self.reduced[:, :m] @ weights, self.reduced[:, m:]])
-            return weights, _least(weighted, slack, self._others(), guess > 0)[1][1:]
+            return weights, _least(weighted, slack, small)[1][1:]
         except (RuntimeError, np.linalg.LinAlgError):
             return None
 
@@ -177,12 +167,11 @@ class Conditions:
         lower, upper, below, above = np.split(of_sides, [n, 2 * n, 2 * n + r])
         return Multipliers(of_objectives / self.linear.scales, (of_equations + above - below) / nlp.g_scale, (upper - lower) / units(nlp))
 
-    def _others(self) -> np.ndarray:
-        """`SMALL_MULTIPLIERS` for the inequalities that are not bounds of free variables, else 0."""
+    def _others(self) -> list[np.ndarray]:
+        """Masks, group by group, of the inequalities that are not bounds of free variables."""
         nlp = self.linear.nlp
         kept = np.setdiff1d(np.arange(len(nlp.variables)), nlp.free)
-        masks = [np.isin(np.flatnonzero(one), kept) if k < 2 else one[one] for k, one in enumerate(self.linear.near)]
-        return SMALL_MULTIPLIERS * np.concatenate(masks)
+        return [np.isin(np.flatnonzero(one), kept) if k < 2 else one[one] for k, one in enumerate(self.linear.near)]
 
 
 def units(nlp: NLP) -> np.ndarray:
@@ -282,9 +271,8 @@ def _each(factors: SuperLU, right: np.ndarray, side: str) -> np.ndarray:
     return solution
 
 
-def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0, guess: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0) -> tuple[float, np.ndarray]:
     """The least norm of (A x, slack nu) over x = (mu, nu) >= 0 with sum mu = 1, and that x; with nu times `small` among the residuals, too.
-    guess (k,): which nu are probably positive.
 
     Without that last condition, but with (sum mu - 1) among the residuals, the answer is the same up to a factor: the residual of the
     direction of x only shrinks with its length, and the length that is best is a growing function of how small it is.
@@ -293,12 +281,11 @@ def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0, gu
     M = np.vstack([A, np.hstack([np.zeros((k, m)), np.diag(np.hypot(slack, small))])])
     full = np.vstack([M, np.r_[np.ones(m), np.zeros(k)]])
     right = np.r_[np.zeros(len(M)), 1.0]
-    near = slack <= 1e-4 if guess is None else guess
-    x, taken, lengths = np.zeros(full.shape[1]), np.r_[np.ones(m, dtype=bool), near], np.linalg.norm(full, axis=0)
+    x, taken, lengths = np.zeros(full.shape[1]), np.r_[np.ones(m, dtype=bool), slack <= 1e-4], np.linalg.norm(full, axis=0)
     while True:
         # Of hundreds of limits that a flight is near few are active: others join where they would make the residual smaller.
         rows = full[:, taken].any(axis=1)
-        x[taken] = _not_negative(full[np.ix_(rows, taken)], right[rows], guess is not None)
+        x[taken] = _not_negative(full[np.ix_(rows, taken)], right[rows])
         left = right - full @ x
         missing = ~taken & (full.T @ left > 1e-3 * np.linalg.norm(left) * lengths)
         if not missing.any() or np.linalg.norm(left) <= 1e-10:
@@ -315,15 +302,14 @@ def _least(A: np.ndarray, slack: np.ndarray, small: np.ndarray | float = 0.0, gu
     return min(found, key=lambda one: one[0])
 
 
-def _not_negative(A: np.ndarray, right: np.ndarray, all_active: bool = False) -> np.ndarray:
+def _not_negative(A: np.ndarray, right: np.ndarray) -> np.ndarray:
     """The x >= 0 with the least norm of A x - right, of hundreds of columns by block principal pivoting from all of them, which takes some
-    solves where most are active, and one where all are, as is likely where so said: Kim and Park, "Fast nonnegative matrix factorization",
-    SIAM J. Sci. Comput. 33(6), 2011. Of few, and where that does not end, by `nnls`: of several solutions, it has one with few numbers that
-    are not 0."""
+    solves where most are active: Kim and Park, "Fast nonnegative matrix factorization", SIAM J. Sci. Comput. 33(6), 2011. Of few, and where
+    that does not end, by `nnls`: of several solutions, it has one with few numbers that are not 0."""
     squares, products = A.T @ A, A.T @ right
     least = 1e-12 * np.linalg.norm(right) * np.sqrt(np.diag(squares))
     passive, fewest, tries = np.ones(len(products), dtype=bool), len(products) + 1, 3
-    for _ in range(100 if all_active or len(products) > 300 else 0):
+    for _ in range(100 if len(products) > 300 else 0):
         x, own = np.zeros(len(products)), np.flatnonzero(passive)
         try:
             x[own] = cho_solve(cho_factor(squares[np.ix_(own, own)], check_finite=False), products[own], check_finite=False)
