@@ -26,8 +26,6 @@ METHODS = (*EXPLICIT, "Radau", "BDF", "LSODA")
 """Those that are implicit solve for all arcs in one dense system, so that each arc is integrated alone."""
 STIFF = "Radau"
 """The method for arcs on which an explicit one has used up `MOST_CALLS`."""
-FIRST_STEP = 0.25
-"""Of DOP853 on each element, of length 2: about what scipy's rule for it gives, which needs the rates twice."""
 STAGES, TERMS = np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA]), 3 + len(DOP853.D)
 """Of DOP853: where in a step its stages are, with the end and those for the interpolant, and how many terms that has."""
 POWERS = "powers"
@@ -119,7 +117,8 @@ class Arcs:
         """See `_on_element`: by the steps, errors and interpolants of scipy's DOP853, whose stages are one call of a Function."""
         (known, u, times, step_in_time, out), evaluate = self._steps
         known[:], half = y, 0.5 * self.lengths[j]
-        tau, step, most, taus, parts = -1.0, FIRST_STEP, 10.0, list[float](), list[np.ndarray]()
+        # The first step is about what scipy's rule for it gives, which needs the rates twice.
+        tau, step, most, taus, parts = -1.0, 0.25, 10.0, list[float](), list[np.ndarray]()
         while tau < 1.0:
             step, last = min(step, 1.0 - tau), tau + step >= 1.0
             self._count(len(STAGES))
