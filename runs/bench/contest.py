@@ -5,38 +5,41 @@ The searches are those of studies: in a folder that is kept, the same command ma
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import fill
 
 import numpy as np
 
 from macs.front import Front
 
-from ..measures.indicators import hypervolume, igd
+from ..measures.indicators import hypervolume, igd, igd_plus
 from ..measures.references import union
-from ..measures.statistics import holm, pairwise, summarise
+from ..measures.statistics import ALPHA, holm, pairwise, summarise
 from ..study import Study
 from . import functions as plain
 from .contract import SECONDS, Bench, Column, Effort, Row, Target, column, rounds_of, short
 from .functions import FUNCTIONS, OURS, PlainFunction, solvers
 
-WORDS = {"igd": "IGD", "volume": "hypervolume"}
+WORDS = {"igd": "IGD", "igd_plus": "IGD+", "volume": "hypervolume"}
 LARGER = ("volume",)
 """Indicators of which larger values are better."""
-SIGNIFICANT = 0.05
+OUTCOMES = ("better on", "worse on", "no difference shown on")
 UNJUDGED = "Not judged: what is asked is asked of all functions with all their evaluations, against all rivals."
 ABOUT = (
     "MACS with its defaults against algorithms of pymoo with theirs, at equal evaluations. Populations are as large as the archive of "
     "MACS; NSGA-III gives all its non-dominated points. Points: how many there are. IGD: mean distance of the true front from the "
-    "points, in the objectives' units for UF (as in the competition), else in ranges of the front. Hypervolume: in these ranges, up to "
-    "1.1. Distance: of the points from the front, in closed form. Medians and quartiles over seeds; rank: of the median among all; to "
-    "best rival: the median of MACS divided by the best rival's (IGD: below 1 is better, hypervolume: above 1); p: two-sided "
-    "Mann-Whitney test against MACS, from five seeds on, by {by}, corrected by Holm over the rivals of each function. NSGA-III, MOEA/D "
-    "and RVEA have as many directions as points: a simplex lattice where one has so many, else evenly spread ones. All seeds are spawned "
-    "from {seeds[0]}{seeds[1]}.{ranges}"
+    "points, in the objectives' units for UF (as in the competition), else in ranges of the front; IGD+: an objective counts only "
+    "where a point is worse. Hypervolume: in these ranges, up to 1.1. Distance: of the points from the front, in closed form. Medians "
+    "and quartiles over seeds; rank: of the median among all; to best rival: the median of MACS divided by the best rival's "
+    "(hypervolume: above 1 is better, else below 1); p: two-sided Mann-Whitney test against MACS, from five seeds on, by {by}, "
+    "corrected by Holm over the rivals of each function. NSGA-III, MOEA/D and RVEA have as many directions as points: a simplex "
+    "lattice where one has so many, else evenly spread ones. All seeds are spawned from {seeds[0]}{seeds[1]}.{ranges}"
 )
 
 Fronts = dict[str, list[Front]]
@@ -52,8 +55,9 @@ class Contest:
     rivals: tuple[str, ...]
     quick: tuple[str, ...]  # functions of the quick benchmark
     by: str  # the indicator that tests and targets are of
-    share: float | None = None  # of the functions on which the best median of all is asked; None: as `asked_of_many` says
+    share: float | None = None  # of the functions on which the best median of all is asked; None: nothing is, but of the first set
     seeds: tuple[int, str] = (2026, "")  # the one that all are spawned from, and what is to be said of these
+    more: str = ""  # what else its page says first
 
     @property
     def solvers(self) -> tuple[str, ...]:
@@ -92,8 +96,10 @@ class Contest:
     def targets(self, rows: Sequence[Row]) -> list[Target]:
         """What is asked of the set."""
         cases = self.complete(rows)
-        if not cases or self.share is None:
+        if self.name == "many":
             return asked_of_many(rows, cases)
+        if not cases or self.share is None:
+            return []
         good = as_good_as_the_best(rows, cases, self.by, 1.0)
         asked = f"best median {WORDS[self.by]} on at least {100 * self.share:g} %"
         return [Target(f"{len(cases)} functions", asked, f"{len(good)} of {len(cases)}", len(good) >= self.share * len(cases))]
@@ -117,13 +123,15 @@ class Contest:
 
     def about(self, rows: Sequence[Row]) -> str:
         """What is measured."""
-        known = any(row.values.get("igd") for row in rows)
+        known = any(key.startswith("igd") for row in rows for key in row.values)
         ranges = "" if known else " Ranges are those of what is non-dominated among all that all found."
-        return f"{self.heading}: {ABOUT.format(by=WORDS[self.by], ranges=ranges, seeds=self.seeds)}"
+        return f"{self.heading}: {self.more}{ABOUT.format(by=WORDS[self.by], ranges=ranges, seeds=self.seeds)}"
 
     def notes(self, rows: Sequence[Row]) -> list[str]:
         """How ours stands against the best rivals, and whether the set is judged."""
-        return against_the_best(rows, self.by, p_values(rows, self.by)) + ([] if self.complete(rows) else [UNJUDGED])
+        keys = [self.by, *(key for key in ("igd_plus",) if any(key in row.values for row in rows))]
+        found = [line for key in keys for line in against_the_best(rows, key, p_values(rows, key))]
+        return found + ([] if self.complete(rows) else [UNJUDGED])
 
     @property
     def bench(self) -> Bench:
@@ -183,7 +191,8 @@ def compared(function: PlainFunction, fronts: Fronts) -> list[Row]:
             }
             if function.front and truth is not None:
                 raw = function.name.startswith("UF")
-                values["igd"] = igd(front.F, truth, normalise=not raw, curve=not raw)
+                measures = {"igd": igd, "igd_plus": igd_plus}
+                values |= {key: measures[key](front.F, truth, normalise=not raw, curve=not raw) for key in function.distances}
             if function.distance and len(front):
                 values["distance"] = float(function.distance(front.F).mean())
             # An infinite distance, of a front without points, counts: `Row.once` would leave it out.
@@ -251,20 +260,29 @@ def p_values(rows: Sequence[Row], key: str) -> dict[tuple[str, str], float]:
 
 
 def against_the_best(rows: Sequence[Row], key: str, p: Mapping[tuple[str, str], float]) -> list[str]:
-    """A line on how many functions ours differs from the best rival of each, and an empty one; none if nothing was tested."""
-    better, worse, tested = 0, 0, 0
-    for case in dict.fromkeys(row.case for row in rows):
-        values = medians(rows, case, key)
-        who, rival = best_rival(values, key) if len(values) > 1 else ("", 0.0)
-        if (case, who) in p:
-            tested += 1
-            if p[case, who] < SIGNIFICANT:
-                ahead = (values[OURS] > rival) == (key in LARGER)
-                better, worse = better + ahead, worse + (not ahead)
-    if not tested:
+    """Lines on which functions ours differs from the best rival of each, how often from each rival, and where it is the last; none if
+    nothing was tested."""
+    if not p:
         return []
-    counts = f"better on {better}, worse on {worse}, no difference shown on {tested - better - worse}"
-    return [f"Against the best rival of each function (p < {SIGNIFICANT:g}): {counts}.", ""]
+    found, each, last = {word: list[str]() for word in OUTCOMES}, dict[str, Counter[str]](), list[str]()
+    for case in dict.fromkeys(case for case, _ in p):
+        values = medians(rows, case, key)
+        first, worst = best_rival(values, key)[0], (min if key in LARGER else max)(values.values())
+        last += [case] if values[OURS] == worst != values[first] else []
+        for who in values.keys() - {OURS}:
+            ahead = (values[OURS] > values[who]) == (key in LARGER)
+            word = OUTCOMES[2 if p[case, who] >= ALPHA else int(not ahead)]
+            each.setdefault(who, Counter())[word] += 1
+            if who == first:
+                found[word].append(case if word != OUTCOMES[1] else f"{case} to {who}")
+    best = ", ".join(f"{word} {len(cases)}{' (' + ', '.join(cases) + ')' if cases else ''}" for word, cases in found.items())
+    pairs = "; ".join(f"{who} {', '.join(str(each[who][word]) for word in OUTCOMES)}" for who in dict.fromkeys(who for _, who in p))
+    lines = [
+        f"By {WORDS[key]}, against the best rival of each function (p < {ALPHA:g}): {best}.",
+        f"Number of functions better, worse, without difference, against {pairs}.",
+        f"Last of all by the median: {', '.join(last) or 'on none'}.",
+    ]
+    return [*(fill(line, 140, break_on_hyphens=False) for line in lines), ""]
 
 
 # The table
@@ -274,7 +292,7 @@ def columns_of(rows: Sequence[Row], p: Mapping[tuple[str, str], float]) -> tuple
     """The columns of a table: those indicators that there are, and comparisons where there are several solvers."""
     columns: list[Column] = []
     several = len({row.who for row in rows}) > 1
-    for key, title in (("igd", "IGD"), ("volume", "hypervolume"), ("distance", "distance")):
+    for key, title in (*WORDS.items(), ("distance", "distance")):
         if any(row.values.get(key) for row in rows):
             columns.append((title, "", lambda row, key=key: spread(row, key)))  # type: ignore[misc]
             if several:
@@ -314,6 +332,14 @@ def ratio(rows: Sequence[Row], row: Row, key: str) -> str:
 
 
 PYMOO = ("NSGA-II", "NSGA-III", "MOEA/D", "AGE-MOEA-II")
+CONSTRAINED = ("NSGA-II", "NSGA-III", "SMS-EMOA", "AGE-MOEA-II", "RVEA", "C-TAEA")
+untuned = partial(
+    Contest,
+    by="volume",
+    seeds=(58, ", not used before"),
+    more="Nothing in this package was tuned on these functions, and nothing is asked. Without MOEA/D, which takes "
+    "ten times as long as most others. ",
+)
 ALL_CONTESTS = (
     Contest("many", "MANY OBJECTIVES", (*PYMOO, "RVEA"), ("DTLZ2, 5 objectives",), "volume"),
     Contest("uf", "UF1 TO UF10 OF CEC 2009", PYMOO, ("UF1", "UF8"), "igd", 0.7),
@@ -321,12 +347,16 @@ ALL_CONTESTS = (
     Contest(
         "constrained",
         "CONSTRAINTS",
-        ("NSGA-II", "NSGA-III", "SMS-EMOA", "AGE-MOEA-II", "RVEA", "C-TAEA"),
+        CONSTRAINED,
         ("MW1", "C2DTLZ2"),
         "volume",
         0.6,
         (2029, ", none of which was used before MACS and what is asked were as they are"),
     ),
+    untuned("maf", "MAF, 5 OBJECTIVES", ("NSGA-II", "NSGA-III", "AGE-MOEA-II", "RVEA"), ("MaF1",)),
+    untuned("wfg", "WFG, 3 OBJECTIVES", ("NSGA-II", "NSGA-III", "SMS-EMOA", "AGE-MOEA-II", "RVEA"), ("WFG4",)),
+    untuned("cf", "CF OF CEC 2009", CONSTRAINED, ("CF1",)),
+    untuned("re", "REAL-WORLD PROBLEMS WITH CONSTRAINTS", CONSTRAINED, ("CRE31",)),
 )
 CONTESTS = {one.name: one.bench for one in ALL_CONTESTS}
 

@@ -1,4 +1,11 @@
-"""Plain functions with known fronts: UF1 to UF10 of CEC 2009, and those of pymoo; the sets of them that solvers are compared on."""
+"""Plain functions with known fronts: UF1 to UF10 of CEC 2009, and those of pymoo; the sets of them that solvers are compared on.
+
+Nothing was tuned on MaF, WFG, CF of CEC 2009, and CRE.
+Which functions of a set are taken was fixed before their first contest. MaF: the first six; MaF7 is DTLZ7, which search was tuned on. WFG:
+one for each difficulty, bias, a front in pieces, many local optima, variables that are not separable, and deception. CF: of two that have
+the same front (4 and 5, 6 and 7, 9 and 10), the one with more local optima. CRE: not the welded beam, which the catalogue has, too, nor
+the one with five objectives, for which SMS-EMOA takes ten times as long as all others together.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +19,7 @@ import numpy as np
 from macs import AGEMOEA2, CTAEA, MACS, MOEAD, NSGA2, NSGA3, RVEA, SMSEMOA, Solver
 from macs.evaluation.blackbox import plain_problem
 from macs.pareto.directions import simplex_lattice
+from macs.pareto.dominance import nondominated
 from problems.vector import CompiledVectorProblem
 
 OURS = "MACS"
@@ -122,6 +130,7 @@ class PlainFunction:
     # () -> points (k, m) of the true front. Without it, what is non-dominated among all that was found gives the ranges.
     front: Callable[[], np.ndarray] | None = None
     distance: Callable[[np.ndarray], np.ndarray] | None = None  # F (k, m) -> (k,): how far points are from the true front, in closed form
+    distances: tuple[str, ...] = ("igd",)  # which are measured from the true front: "igd", "igd_plus"
 
     def stated(self) -> CompiledVectorProblem:
         """The problem as studies take it."""
@@ -198,6 +207,117 @@ def constrained(name: str) -> PlainFunction:
     return PlainFunction(name.upper(), partial(from_pymoo, name), from_pymoo(name)[0].n_obj, 30_000, 100)
 
 
+small = partial(PlainFunction, evaluations=5_000, distances=("igd_plus",))
+"""A function with a search of about a second; competitions have 20 to 60 times as many evaluations, CRE in its paper 2 times, as here."""
+
+
+@dataclass(frozen=True)
+class MaF:
+    """MaF1 to MaF6, whose last ten variables are 0.5 on the front, and their true fronts.
+
+    Cheng, Li, Tian, Zhang, Yang, Jin and Yao, A benchmark test suite for evolutionary many-objective optimization, Complex & Intelligent
+    Systems 3, 2017; MaF5 as in their code, PlatEMO, without powers of four.
+    """
+
+    kind: int  # 1 to 6
+
+    def __call__(self, X: np.ndarray) -> np.ndarray:
+        """Five objectives (k, 5) of vectors X (k, 14), from 0 to 1."""
+        place, rest = X[:, :4], X[:, 4:] - 0.5
+        g = (rest**2).sum(axis=1, keepdims=True)
+        if self.kind in (3, 4):
+            g = 100.0 * (10.0 + g - np.cos(20.0 * np.pi * rest).sum(axis=1, keepdims=True))
+        elif self.kind == 2:  # each objective has variables of its own, and half their range
+            g = ((rest / 2.0) ** 2).reshape(len(X), 5, 2).sum(axis=2)
+            place = place / 2.0 + 0.25
+        elif self.kind == 5:
+            place = place**100
+        elif self.kind == 6:
+            place = np.hstack([place[:, :1], (1.0 + 2.0 * g * place[:, 1:]) / (2.0 + 2.0 * g)])
+            g = 100.0 * g
+        along, across = (place, 1.0 - place) if self.kind == 1 else (np.cos(place * np.pi / 2.0), np.sin(place * np.pi / 2.0))
+        one = np.ones((len(X), 1))
+        shape = np.cumprod(np.hstack([one, along]), axis=1)[:, ::-1] * np.hstack([one, across[:, ::-1]])
+        return self._placed(shape, 1.0 + g)
+
+    def _placed(self, shape: np.ndarray, radius: np.ndarray | float) -> np.ndarray:
+        """Objectives (k, 5) from points of the unit simplex or sphere, and how far out they are."""
+        F, powers = radius * shape, 2.0 ** np.arange(1, 6)
+        if self.kind in (1, 4):  # inverted
+            return (radius - F) * (1.0 if self.kind == 1 else powers)
+        if self.kind == 3:
+            return np.hstack([F[:, :-1] ** 4, F[:, -1:] ** 2])
+        return F * (powers[::-1] if self.kind == 5 else 1.0)
+
+    def front(self) -> np.ndarray:
+        """Some 1000 points (k, 5) of the true front."""
+        if self.kind not in (2, 6):
+            return self._placed(lattice_on(5) if self.kind == 1 else sphere(5), 1.0)
+        # Of MaF6 it is a curve.
+        sides = [np.linspace(0.0, 1.0, 6)] * 4 if self.kind == 2 else [np.linspace(0.0, 1.0, 1000), *[np.zeros(1)] * 3]
+        place = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 4)
+        return self(np.hstack([place, np.full((len(place), 10), 0.5)]))
+
+
+def wfg_front(kind: int) -> np.ndarray:
+    """Points (k, 3) of the true front of WFG1, 2, or 4 to 9 with three objectives (Huband, Hingston, Barone and While 2006)."""
+    ranges = np.array([2.0, 4.0, 6.0])
+    if kind >= 4:
+        return sphere(3) * ranges
+    x, y = (side.ravel() for side in np.meshgrid(np.linspace(0.0, 1.0, 200), np.linspace(0.0, 1.0, 50)))
+    a, b = x * np.pi / 2.0, y * np.pi / 2.0
+    last = 1.0 - x - np.cos(10.0 * np.pi * x + np.pi / 2.0) / (10.0 * np.pi) if kind == 1 else 1.0 - x * np.cos(5.0 * np.pi * x) ** 2
+    F = ranges * np.column_stack([(1.0 - np.cos(a)) * (1.0 - np.cos(b)), (1.0 - np.cos(a)) * (1.0 - np.sin(b)), last])
+    return F[nondominated(F)]
+
+
+def cf_front(kind: int) -> np.ndarray:
+    """Points (k, m) of the true front of CF1 to CF10 (Zhang and others 2008, as of `UF`), evenly in the first objective or by angles."""
+    x = np.linspace(0.0, 1.0, 2001)
+    if kind == 1:
+        return np.column_stack([x[::100], 1.0 - x[::100]])
+    if kind in (2, 3):
+        power = 0.5 if kind == 2 else 2.0
+        place = 4.0 * x**power
+        x = x[(place == 0.0) | ((place >= 1.0) & (place <= 2.0)) | (place >= 3.0)]
+        return np.column_stack([x, 1.0 - x**power])
+    if kind in (4, 5):
+        return np.column_stack([x, np.select([x <= 0.5, x <= 0.75], [1.0 - x, 0.75 - 0.5 * x], 1.125 - x)])
+    if kind in (6, 7):
+        return np.column_stack([x, np.select([x <= 0.5, x <= 0.75], [(1.0 - x) ** 2, 0.5 - 0.5 * x], 0.25 * np.sqrt(1.0 - x))])
+    # Meridians of a sphere, and of CF9 and CF10 what lies between every other two of them.
+    share = np.linspace(0.0, 1.0, 5) if kind == 8 else np.concatenate([[0.0], np.linspace(0.25, 0.5, 25), np.linspace(0.75, 1.0, 25)])
+    first, angle = (side.ravel() for side in np.meshgrid(np.sqrt(share), np.linspace(0.0, np.pi / 2.0, 100)))
+    return np.column_stack([np.cos(angle) * first, np.cos(angle) * np.sqrt(1.0 - first**2), np.sin(angle)])
+
+
+def from_cmo(name: str) -> tuple[Any, ...]:
+    """A problem of the package cmo. Raises ValueError if that is not installed."""
+    try:
+        from cmo.problems.factory import get_problem
+    except ImportError:
+        raise ValueError("sets 'cf' and 're' need cmo, which is not installed: pip install 'macs-trajectories[suites]'") from None
+    return (get_problem(name),)
+
+
+def maf(kind: int) -> PlainFunction:
+    """MaF1 to MaF6."""
+    one = MaF(kind)
+    return small(f"MaF{kind}", lambda: (one, [(0.0, 1.0)] * 14), 5, points=110, front=one.front)
+
+
+def wfg(kind: int) -> PlainFunction:
+    """WFG with four variables of place and twenty of distance, as pymoo has it."""
+    problem = partial(from_pymoo, f"wfg{kind}", n_var=24, n_obj=3)
+    return small(f"WFG{kind}", problem, 3, points=105, front=partial(wfg_front, kind))
+
+
+def limited(name: str, m: int, **more: Any) -> PlainFunction:
+    """A problem with constraints, of the package cmo: CF with ten variables, or CRE (Tanabe and Ishibuchi 2020), whose constraints are 0 or
+    by how much a limit is exceeded, as their authors state them."""
+    return small(name, partial(from_cmo, name.lower()), m, points=100 if m == 2 else 105, **more)
+
+
 FUNCTIONS: dict[str, Callable[[], tuple[PlainFunction, ...]]] = {
     "many": lambda: (*(dtlz(kind, 5) for kind in (1, 2, 3, 4, 7)), dtlz(2, 8)),
     "uf": lambda: tuple(map(cec, range(1, 11))),
@@ -205,6 +325,10 @@ FUNCTIONS: dict[str, Callable[[], tuple[PlainFunction, ...]]] = {
     "constrained": lambda: tuple(
         map(constrained, (*(f"mw{i}" for i in range(1, 15)), "c1dtlz1", "c1dtlz3", "c2dtlz2", "c3dtlz1", "c3dtlz4"))
     ),
+    "maf": lambda: tuple(map(maf, range(1, 7))),
+    "wfg": lambda: tuple(map(wfg, (1, 2, 4, 6, 9))),
+    "cf": lambda: tuple(limited(f"CF{k}", 2 if k < 8 else 3, front=partial(cf_front, k)) for k in (1, 2, 3, 5, 7, 8, 10)),
+    "re": lambda: tuple(limited(f"CRE{k}", k // 10, evaluations=10_000) for k in (21, 23, 24, 25, 31, 32)),
 }
 """The sets, made only when they are asked for: pymoo is imported then."""
 

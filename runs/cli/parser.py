@@ -39,23 +39,27 @@ was wrong, 130 ended by Ctrl-C or SIGTERM"""
 BENCH = """\
 Ratios against the alternatives, measured side by side in one run, with their spread: absolute times depend on the machine.
 
+cf          CF of CEC 2009, as maf, with constraints: MACS against the other algorithms, hypervolume and IGD+
 constrained MW1-14 and DTLZ with constraints: MACS against the other algorithms at equal evaluations, hypervolume
 corpus      gradient solves, iterations and CPU time for one optimum of every problem, with defaults
 curve       fronts as curves: points and solves for an error, how many targets solved anew lie within it, and a finer mesh
 front       whole fronts by MACS until it is done, by its other inner levels to the same quality, and by sweeps from one and ten starts
 generation  how the time of a generation of NSGA-III grows with individuals, nodes and constraints, beside the orders of its paper
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
+maf         MaF with 5 objectives, which nothing was tuned on, 5,000 evaluations: hypervolume and IGD+; nothing is asked
 many        DTLZ with 5 and 8 objectives, likewise: distance from the front, hypervolume
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 parts       MACS without one of its parts at a time, on problems that nothing was tuned on: hypervolume, time, number of problems solved
 peers       the examples of YAPSS, from statement to solution, here, in YAPSS and in rockit: pip install 'macs-trajectories[peers]'
 population  120 re-entries simulated and scored in one call, as a population search sends them, against one after the other
+re          real-world problems with constraints, as maf: hypervolume
 scale       how time and memory grow with elements, nodes, phases, variables, points and agents: exponents beside the limit of 1.1
 search      MACS against gradient sweeps from many starts, on the same mesh, at the same number of points and counted work
 standard    every published problem with defaults, each in a process of its own: ours, published, error when simulated, memory
 uf          UF1 to UF10 of CEC 2009, likewise: IGD as in the competition
 zdt         ZDT1-4 and 6, likewise
 study       a study with two processes against one, and how much longer it takes than its runs do
+wfg         WFG with 3 objectives, as maf
 wild        the same as standard for problems that others asked about: each stands for a kind that was wrong once
 
 What is asked is printed beside the measured values, and judged by medians of rounds or seeds. The exit code is 1 where anything is missed.

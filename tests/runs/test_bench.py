@@ -18,6 +18,7 @@ from problems import Problem
 from problems.cases.standard import published
 from runs.bench import BENCHES, corpus, curve, growth, header_of, inner, peers, searches, study, workers
 from runs.bench import published as optima
+from runs.bench.contest import CONTESTS
 from runs.bench.contract import Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
 from runs.cli import main
 from transcription import DFET
@@ -134,10 +135,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (
-            ["studies"],
-            ["studies", "study", "constrained, corpus, curve, front, generation, inner, many, methods, parts, peers, population"],
-        ),
+        (["studies"], ["studies", "study", "cf, constrained, corpus, curve, front, generation, inner, maf, many"]),
         (["iner"], ["'iner'", "did you mean inner?"]),
         (["inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
         (["inner", "--seeds", "2"], ["'inner' has none"]),
@@ -248,7 +246,7 @@ MET_AND_MISSED = [
 def test_targets_follow_the_medians():
     for kind, rows, missed in MET_AND_MISSED:
         assert sum(not one.met for one in BENCHES[kind].targets(rows)) == missed, (kind, rows)
-    assert set(BENCHES) - {kind for kind, *_ in MET_AND_MISSED} == {"corpus", "many", "parts", "uf", "zdt", "constrained"}
+    assert set(BENCHES) - {kind for kind, *_ in MET_AND_MISSED} == {"corpus", "parts", *CONTESTS}
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import pytest
 from plain import dtlz, uf
 
 from macs.pareto.dominance import nondominated
+from runs import gd
 from runs.bench import BENCHES, contest, solvers_of
 from runs.bench import functions as plain
 from runs.bench.contract import Effort, Row
@@ -81,6 +82,65 @@ def test_functions_of_pymoo_are_those_of_the_paper(kind, m):
     elif kind == 7:
         others = front[:, : m - 1]
         np.testing.assert_allclose(function(np.hstack([others, np.zeros((len(others), 20))])), front, rtol=1e-9)
+
+
+ELSEWHERE = {
+    "CRE24": (4734.28, 961.774, 0.789474),
+    "CRE31": (31.8912, 3.96309, 11.8643, 0.0),
+    "CRE32": (-518.799, 11519.4, 11458.7, 3.3586),
+    "CF1": (0.701064, 1.67326, -0.607681),
+    "CF5": (10.0296, 16.3483, 1.215),
+    "CF7": (21.7254, 29.051, 2.67421),
+    "CF8": (12.2587, 4.34016, 8.8034, 7.13079),
+    "CF10": (16.5292, 6.22321, 11.5158, 4.35047),
+    "MaF1": (1.58667, 1.58581, 1.57945, 1.51724, 0.0793565),
+    "MaF2": (0.575792, 0.386086, 0.417472, 0.440992, 0.455029),
+    "MaF6": (33.088, 24.8727, 28.5853, 31.8294, 4.68503),
+}
+"""Objectives and the sum of constraints by other code, at 0.6 of the bounds (CRE), or along their diagonal from 0.05 to 0.95."""
+
+
+@pytest.mark.parametrize(
+    "function", [one for name in ("maf", "wfg", "cf", "re") for one in plain.FUNCTIONS[name]()], ids=lambda one: one.name
+)
+def test_functions_of_sets_have_the_values_and_fronts_of_other_sources(function):
+    problem = function.stated()
+    if function.name in ELSEWHERE:
+        lower, upper = np.array([(one.lower, one.upper) for one in problem.variables]).T
+        share = 0.6 if function.name.startswith("CRE") else np.linspace(0.05, 0.95, len(lower))
+        F, G = problem.rows((lower + share * (upper - lower))[None])
+        assert [*F[0], *([G.sum()] if G.size else [])] == pytest.approx(ELSEWHERE[function.name], rel=1e-5, abs=1e-9)
+    if function.front is not None:
+        front = function.front()[::7]
+        assert front.shape[1] == function.objectives and nondominated(front).all()
+
+
+@pytest.mark.parametrize(("kind", "other"), [(3, 3), (4, 3), (5, 4)])
+def test_maf_is_made_of_dtlz(kind, other):
+    X = np.random.default_rng(3).random((20, 14))
+    F, powers = dtlz(other, 5)[0](X), 2.0 ** np.arange(1, 6)
+    inverted = (np.linalg.norm(F, axis=1, keepdims=True) - F) * powers
+    made = {3: np.hstack([F[:, :4] ** 4, F[:, 4:] ** 2]), 4: inverted, 5: F * powers[::-1]}[kind]
+    np.testing.assert_allclose(plain.MaF(kind)(X), made, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "near"), [("WFG2", 0.05), ("WFG4", 0.05), ("CF2", 0.001), ("CF3", 0.005), ("CF5", 0.001), ("CF7", 0.001)])
+def test_points_that_packages_give_are_near_the_fronts_and_dominate_none_of_theirs(name, near):
+    function = next(one for made in ("wfg", "cf") for one in plain.FUNCTIONS[made]() if one.name == name)
+    (problem,), front = function.problem(), function.front()[::3]
+    given = problem.pareto_front() if name.startswith("CF") else problem.evaluate(problem.pareto_set(n_points=300), return_values_of=["F"])
+    given = given[nondominated(given) & (given <= 1.1 * front.max(axis=0)).all(axis=1)]
+    assert len(given) > 50 and gd(given, front) < near
+    assert nondominated(np.vstack([front, given + 1e-3 * np.ptp(front, axis=0)]))[: len(front)].all()
+
+
+@pytest.mark.parametrize("kind", [1, 8, 10])
+def test_the_fronts_of_cf_meet_their_constraints(kind):
+    F = plain.cf_front(kind)
+    F = F[F[:, -1] < 0.999] if kind > 1 else F
+    np.testing.assert_allclose(F.sum(axis=1) if kind == 1 else np.linalg.norm(F, axis=1), 1.0)
+    wave = np.sin(10 * np.pi * (2 * F[:, 0])) if kind == 1 else np.sin(2 * np.pi * (2 * F[:, 0] ** 2 / (1 - F[:, 2] ** 2)))
+    assert (wave if kind == 10 else np.abs(wave)).max() < 1e-9 and len(F) == len(np.unique(F, axis=0)) > 20
 
 
 def rows_of(case: str, key: str, evaluations: float, **found: list[float]) -> list[Row]:
@@ -196,7 +256,7 @@ def test_a_folder_of_other_things_is_refused(tmp_path, capsys):
 def test_a_search_that_fails_is_no_result(tmp_path, monkeypatch):
     """A function of exactly so many rows as a problem's fingerprint needs."""
     function = plain.PlainFunction("ZDT1", lambda: (methodcaller("reshape", 8, 2), [(0, 1)] * 2), 2, 200, 100)
-    monkeypatch.setitem(plain.FUNCTIONS, "zdt", lambda: (function,))
+    monkeypatch.setitem(contest.FUNCTIONS, "zdt", lambda: (function,))
     with pytest.raises(RuntimeError, match="cannot reshape"):
         replace(ZDT, rivals=()).measure([], Effort(keep=str(tmp_path)))
 
@@ -207,11 +267,14 @@ def test_differences_from_the_best_rival_are_counted():
         *rows_of("MW2", "volume", 1.0, MACS=[1, 2, 3, 4, 5], NSGA_II=[6, 7, 8, 9, 10], RVEA=[1, 1, 1, 1, 1]),
         *rows_of("MW3", "volume", 1.0, MACS=[1, 2, 3, 4, 5], NSGA_II=[1, 2, 3, 4, 6], RVEA=[0, 0, 0, 0, 0]),
     ]
-    line = contest.against_the_best(rows, "volume", contest.p_values(rows, "volume"))[0]
-    assert line.endswith("better on 1, worse on 1, no difference shown on 1.")
+    text = " ".join(" ".join(contest.against_the_best(rows, "volume", contest.p_values(rows, "volume"))).split())
+    assert "better on 1 (MW1), worse on 1 (MW2 to NSGA-II), no difference shown on 1 (MW3)." in text
+    assert "against NSGA-II 1, 1, 1; RVEA 3, 0, 0." in text
+    assert text.endswith("Last of all by the median: on none.")
     turned = [row for row in rows if row.case == "MW1"]
     turned = [Row(row.case, row.who, {"igd": row.values["volume"]}) for row in turned if row.who != "RVEA"]
-    assert "better on 0, worse on 1" in contest.against_the_best(turned, "igd", contest.p_values(turned, "igd"))[0]
+    lines = contest.against_the_best(turned, "igd", contest.p_values(turned, "igd"))
+    assert "better on 0, worse on 1" in lines[0] and "Last of all by the median: MW1." in lines
     assert contest.against_the_best(rows_of("MW1", "volume", 1.0, MACS=[1]), "volume", {}) == []
 
 
