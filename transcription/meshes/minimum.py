@@ -12,14 +12,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
+import casadi as ca
 import numpy as np
 
-from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable
+from problems.compiled import CompiledPhase, CompiledProblem, Limit, Variable, remembered
 
 from ..base import NLP
-from ..nlp.optimality import Multipliers, hamiltonian, integral_weights
+from ..nlp.optimality import Multipliers, integral_weights
+from ..numerics.batched import Batched, expanded
 from ..numerics.polynomials import gauss_legendre
-from ..trajectories.limits import paths_and_peaks
 from ..trajectories.trajectory import PhaseTrajectory, PiecewisePolynomial, Trajectory
 
 TAU, WEIGHTS = gauss_legendre(24)
@@ -81,24 +82,40 @@ def _gain(
     x, u, t, s = trajectory.sampled(TAU, parameters)
     adjoint = costates(t)  # they may have other pieces
 
-    def under(controls: np.ndarray) -> np.ndarray:
-        return hamiltonian(phase, adjoint, weights, x, controls, t, s)
-
-    own, (paths, peaks) = under(u), paths_and_peaks(phase, x, u, t, s)
-    highest = peaks.max(axis=0)
-    clear = _clear(phase, x, paths, peaks, highest)
-    best, least = np.zeros(len(t)), u.copy()
+    tried = np.stack([u, *_others(phase, u)], axis=1)
+    k, p, _ = tried.shape
+    (found,) = _comparison(phase, p)(adjoint, np.tile(weights, (k, 1)), x, tried, t, np.tile(s, (k, 1)))
+    values, paths, peaks = np.split(found.reshape(k, p, -1), [1, 1 + len(phase.paths)], axis=2)
+    highest = peaks[:, 0].max(axis=0)
+    clear = _clear(phase, x, paths[:, 0], peaks[:, 0], highest)
     lower, upper = (np.array([getattr(limit, side) for limit in phase.paths]) for side in ("lower", "upper"))
-    for controls in _others(phase, u):
-        values, (limited, raised) = under(controls), paths_and_peaks(phase, x, controls, t, s)
-        allowed = ((lower <= limited) & (limited <= upper)).all(axis=1) & (raised <= highest).all(axis=1)
-        better = allowed & (own - values > best)
-        best[better], least[better] = (own - values)[better], controls[better]
-    rates = np.where(clear & np.isfinite(own), best, 0.0).reshape(shape)
+    allowed = ((lower <= paths) & (paths <= upper)).all(axis=2) & (peaks <= highest).all(axis=2)
+    less, own = (values[:, :1] - values)[:, :, 0], np.arange(k)
+    less[~(allowed & (less > 0.0))] = 0.0  # or no number
+    chosen = less.argmax(axis=1)
+    best, least = less[own, chosen], tried[own, chosen]
+    rates = np.where(clear, best, 0.0).reshape(shape)
     amounts = 0.5 * np.diff(trajectory.state.edges) * (rates @ WEIGHTS)
     jumps = np.abs(np.diff(least.reshape(*shape, -1), axis=1)) > 0.5 * np.array([v.span for v in phase.controls])
     middles = 0.5 * (TAU[1:] + TAU[:-1])
     return Gain(amounts, [middles[one] for one in np.any(jumps, axis=2)])
+
+
+@remembered
+def _comparison(phase: CompiledPhase, p: int) -> Batched:
+    """(costates, weights, x, p controls, t, s) -> the Hamiltonian, path constraints and peaks of each control: what depends on the states
+    alone is computed once."""
+    x, u, t, s = phase.dynamics.mx_in()
+    costates, weights, U = ca.MX.sym("l", x.numel()), ca.MX.sym("w", phase.integrands.numel_out()), ca.MX.sym("u", u.numel(), p)
+    columns = []
+    for given in ((x, U[:, i], t, s) for i in range(p)):
+        hamiltonian = ca.dot(costates, phase.dynamics(*given)) + ca.dot(weights, phase.integrands(*given))
+        columns.append(ca.densify(ca.vertcat(hamiltonian, phase.path(*given), phase.peaks(*given))))
+    function = expanded(ca.Function("comparison", [costates, weights, x, U, t, s], [ca.horzcat(*columns)]))
+    if function.is_a("SXFunction"):
+        inputs = function.sx_in()
+        function = ca.Function("comparison", inputs, [ca.cse(function(*inputs))])
+    return Batched(function)
 
 
 def _others(phase: CompiledPhase, u: np.ndarray) -> list[np.ndarray]:

@@ -117,8 +117,8 @@ class Arcs:
         """See `_on_element`: by the steps, errors and interpolants of scipy's DOP853, whose stages are one call of a Function."""
         (known, u, times, step_in_time, out), evaluate = self._steps
         known[:], half = y, 0.5 * self.lengths[j]
-        # The first step is about what scipy's rule for it gives, which needs the rates twice.
-        tau, step, most, taus, parts = -1.0, 0.25, 10.0, list[float](), list[np.ndarray]()
+        # A first step that is short seldom passes over a kink without noticing, and later ones are soon longer.
+        tau, step, most, taus, parts = -1.0, 0.05, 10.0, list[float](), list[np.ndarray]()
         while tau < 1.0:
             step, last = min(step, 1.0 - tau), tau + step >= 1.0
             self._count(len(STAGES))
