@@ -303,7 +303,7 @@ REFUSED: list[tuple[type, dict[str, Any], str]] = [
     (NSGA2, {"population": 1}, "population must be a whole number of at least 2, not 1"),
     (NSGA2, {"handling": "death"}, "handling must be one of 'feasible-first', 'penalty', 'objective', not 'death'"),
     (NSGA2, {"penalty": -1.0}, r"penalty must be in \[0, inf\), not -1.0"),
-    (NSGA2, {"degree": "mean"}, "degree must be one of 'largest', 'sum', 'log', 'printed', not 'mean'"),
+    (NSGA2, {"degree": "mean"}, "degree must be one of 'largest', 'sum', 'log', 'capped', 'printed', not 'mean'"),
     (AGEMOEA2, {"mutation_eta": 0.5}, r"mutation_eta must be in \[1, 100\], not 0.5"),
     (NSGA3, {"divisions": 0}, "divisions must be a whole number of at least 1, not 0"),
     (NSGA3, {"whole": 1}, "whole must be True or False, not 1"),
