@@ -197,7 +197,7 @@ less on all meshes whose optimum was right to 5e-4, and by more on a third of th
 def footer(front: Points) -> list[str]:
     """Lines below the table of a front with points: how many are verified, notes and warnings."""
     lines = _simulated(front) if front.was_simulated.all() else _not_simulated(front) if front.dynamic else []
-    seconds = sorted(front.stats.get("seconds", {}).items(), key=lambda one: -one[1])
+    seconds = sorted(((what, s) for what, s in front.stats.get("seconds", {}).items() if s >= 0.05), key=lambda one: -one[1])
     lines += ["Time: " + ", ".join(f"{what} {amount:.1f} s" for what, amount in seconds) + "."] if seconds else []
     lines += [*_unresolved(front, front), *_without_conflict(front)]
     bad = int((front.status != CONVERGED).sum())
