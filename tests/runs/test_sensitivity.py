@@ -207,7 +207,7 @@ def test_tables_of_the_report(flown_folder, found):
     assert [float(row[column]) for row in rows[1:]] == [one["captured", "%"] for one in found.measures["bank as it is"]]
     shield = next(i for i, name in enumerate(rows[0]) if name.startswith("nominal TPS"))
     np.testing.assert_allclose([float(row[shield]) for row in rows[1:]], found.points.objectives[:, 1])
-    assert "under dispersions, bank solved anew" in made.text and "seed=4" in made.text
+    assert "under dispersions, bank solved anew" in made.text and "by seed 4" in made.text
     assert dispersed_fronts(comparisons(Store.open(flown_folder), {}), {}) == []
 
 
