@@ -68,8 +68,7 @@ def test_a_point_is_its_objectives_and_a_picture():
     front = marked(flights(3), [True, False, True])
     page = shown(front[1])
     assert [row[0] for row in cells(page)] == ["objective", "time", "height"] and "not verified" in "".join(page.itertext())
-    # As simulated, with the digits of the front's table.
-    assert float(cells(page)[1][3]) == pytest.approx(1.01 * front.objectives[1, 0], abs=5e-3)
+    assert float(cells(page)[1][3]) == pytest.approx(1.01 * front.objectives[1, 0], abs=5e-3), "as simulated, with digits of the front"
     assert picture(page).std() > 0.01
     picture(shown(black_box()[0]))
     failed = flights(1, trajectories=[None], status=["failed"])[0]
