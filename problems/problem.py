@@ -166,7 +166,7 @@ class Problem:
         self._objective(name, expr, unit, "maximize", scale)
 
     def with_objectives(self, *names: str) -> Problem:
-        """The same problem with these objectives only. Raises ValueError for one that it has not, with those that there are."""
+        """The same problem with these objectives only; both share all else. Raises ValueError for one that it has not, naming its own."""
         other, unknown = copy(self), [name for name in names if name not in self._objectives]
         if unknown:
             raise ValueError(checks.unknown("objective", unknown[0], self._objectives))
