@@ -264,7 +264,7 @@ def _reference(dialogue: Dialogue, text: str) -> None:
     given = assignments(text, dialogue.goals)
     units = {goal.name: goal.unit for goal in dialogue.goals}
     words = ", ".join(f"{name} {value:g} {units[name]}".rstrip() for name, value in given.items())
-    dialogue.choose(ReferencePoint(given), f"near {words}")
+    dialogue.choose(ReferencePoint(given), f"near {words}{', others at their best' if len(given) < len(units) else ''}")
 
 
 def _prefer_file(dialogue: Dialogue, path: str) -> None:
