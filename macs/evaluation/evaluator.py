@@ -223,9 +223,8 @@ class Counts:
     # Iterations of IPOPT times variables of its program, or what takes about as long: the same on all machines, and comparable for
     # programs of all sizes. Plain functions take none.
     work: int = 0
-    charge: int = (
-        0  # nanoseconds of one processor that all of it takes there, by counts: the same on all machines, see `inner.base.Charges`
-    )
+    # Nanoseconds of one processor that all of it takes, by counts and `PRICES`: the same on all machines.
+    charge: int = 0
     solved: int = 0  # gradient solves that converged, each by itself or all of a batch, and their iterations
     solved_iterations: int = 0
     # By what they were for, see `spending`: gradient solves, their iterations, and those that gave a new point or a better one.
