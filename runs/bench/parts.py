@@ -160,7 +160,7 @@ PROBLEMS: dict[str, dict[str, Stated]] = {
     "trajectories": dict.fromkeys(("goddard", "orbit_rise", "landing_site", "aerocapture")),
     "gradients": dict.fromkeys(("goddard", "landing_site")),
 }
-"""Problems by kind; None: of the catalogue. The first four kinds have archives of 50 points, the others of 10."""
+"""Problems by kind; None: of the catalogue. The last two kinds have archives of 10 points, the others of 50."""
 BUDGETS = {"curves": 2000, "constraints": 2000, "coupled variables": 30_000, "surfaces": 2000, "many objectives": 2000}
 BUDGETS |= {"trajectories": 300, "gradients": 200}
 
