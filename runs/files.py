@@ -34,7 +34,6 @@ Count = Annotated[int, Meta(ge=1, description="a whole number of at least 1")]
 Natural = Annotated[int, Meta(ge=0, description="a whole number of at least 0")]
 Text = Annotated[str, Meta(description="a text")]
 Flag = Annotated[bool, Meta(description="true or false")]
-FurtherFigures = Annotated[tuple[Literal["means"], ...], Meta(description="a list of names of figures")]
 
 
 class Section(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):

@@ -20,7 +20,7 @@ from .batch.cells import INNER, Cell, Modules, check_inner, combine, sampling, w
 from .batch.code import Code, code_of_method
 from .batch.store import Store, StoredRun, StudySummary
 from .execution.task import Payload, RunTask
-from .files import Count, Flag, FurtherFigures, Natural, Positive, Text, checked, errors_begin_with, plain
+from .files import Count, Flag, Natural, Positive, Text, checked, errors_begin_with, plain
 from .measures.references import ReferenceKey, check_reference
 from .report.goal import StatedGoal
 from .report.published import check_against
@@ -92,8 +92,10 @@ class Study:
         see `report.sensitivity`.
     flights : bool, default True
         Whether reports show the flights that stand for each front.
-    figures : sequence of str
-        Further figures of reports: "means" has the mean objectives of the front of each run.
+    pictures : mapping, optional
+        Which figures of the report the page of its results shows, with words below each: {end of a figure's name: words}, such as {"means":
+        "Figure 11 of the paper: ..."}; the longest end counts. Its page alone depends on them, no run does. Default: the fronts, and the
+        hypervolume over charged evaluations, without words.
     note : str
         Text that stands at the beginning of the report.
     trust : bool
@@ -134,7 +136,7 @@ class Study:
     nominal: str | None = field(metadata=_key(), default=None)
     dispersions: Mapping[str, Any] | None = field(metadata=_key(), default=None)
     flights: bool = field(metadata=_key(Flag), default=True)
-    figures: Sequence[str] = field(metadata=_key(FurtherFigures), default=())
+    pictures: Mapping[str, str] = field(metadata=_key(dict[str, Text], record=None), default_factory=dict)
     note: str = field(metadata=_key(Text), default="")
     trust: bool = field(default=True, repr=False)
     cells: tuple[Cell, ...] = field(init=False, repr=False)

@@ -294,7 +294,8 @@ def page_of(arguments: Namespace) -> Page:
     stated = f" --study {shlex.quote(arguments.study)}" if arguments.study else ""
     trusted = " --trust" if arguments.trust else ""
     command = f"macs study report {shlex.quote(arguments.folder)} --page {shlex.quote(arguments.page)}{stated}{trusted}"
-    return Page(arguments.page, command, studyfile.find(source), Study.load(source, trust=arguments.trust).definition())
+    study = Study.load(source, trust=arguments.trust)
+    return Page(arguments.page, command, studyfile.find(source), study.definition(), study.pictures)
 
 
 def page_report(arguments: Namespace) -> int:

@@ -35,6 +35,7 @@ Derived = Callable[[Mapping[str, np.ndarray]], Mapping[str, np.ndarray]]
 """What a case makes of values (n,) by name of state: values by the label of an axis."""
 Law = Mapping[str, np.ndarray]
 """A known optimal flight: "time" (n,) and values (n,) by name, in the units of the problem, as `goddard.optimal_flight` has it."""
+NO_BREAK = "\N{NO-BREAK SPACE}"
 LAW_LOOK: Mapping[str, Any] = {"color": "black", "lw": 0.9, "ls": (0, (4, 2))}
 
 
@@ -92,9 +93,7 @@ class Flights:
         laws = [law(float(point.trajectory.phases[-1].time[-1])) if law and point.trajectory else None for point in self.points]
         name, track = getattr(self.case, "LAW", "known law"), getattr(self.case, "track", None)
         derived: Derived | None = getattr(self.case, "derived", None)
-        found = {"flights": flights_figure(self.points, laws=laws, law_name=name, solver=self.solver, derived=derived)}
-        if track is not None:
-            found["paths"] = paths_figure(self.points, track, laws=laws, law_name=name)
+        found = dict[str, Any]()
         if len(self.comparison.known.goals) > 1:
             found["representatives"] = front_figure(
                 {self.solver: self.comparison.fronts[self.solver]},
@@ -103,6 +102,9 @@ class Flights:
                 marked=np.array([list(point.objectives.values()) for point in self.points]),
                 truth_name=self._truth,
             )
+        if track is not None:
+            found["paths"] = paths_figure(self.points, track, laws=laws, law_name=name)
+        found["flights"] = flights_figure(self.points, laws=laws, law_name=name, solver=self.solver, derived=derived)
         return found | case_figures([self.front[i] for i in representatives(self.front, 100)])
 
     @property
@@ -246,5 +248,5 @@ def _lines(phase: PhaseTrajectory, derived: Derived | None = None) -> dict[str, 
 
 def _title(name: str, point: Point, width: int) -> str:
     """The point's name and objectives, in lines of at most `width` characters."""
-    lines = [f"{goal.name} {quantity(text, goal.unit)}" for goal, text in zip(point.goals, point.texts, strict=True)]
+    lines = [f"{goal.name} {quantity(text, goal.unit).replace(' ', NO_BREAK)}" for goal, text in zip(point.goals, point.texts, strict=True)]
     return "\n".join(part for line in [name, *lines] for part in wrap(line, width))

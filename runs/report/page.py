@@ -119,14 +119,23 @@ def print_standing(pages: Iterable[Path], now: Now) -> bool:
     return all(good for _, good in found.values())
 
 
-PICTURES = ("fronts", "hypervolume-over-charged-evaluations")
-"""Ends of the names of the figures on a page."""
+PICTURES = {"fronts": "", "hypervolume-over-charged-evaluations": ""}
+"""Figures of a page by the ends of their names, and the words below each, unless its study states them."""
+DOTS, SHADES = 150, 256
+"""Dots per inch of pictures on a page, which shows them smaller than they are, and how many colours they have, so that files are small."""
 
 
 class Page:
     """A page of a study, and its pictures beside it: NAME.md and NAME-FIGURE.png."""
 
-    def __init__(self, path: str | PathLike[str], command: str, file: str | PathLike[str], definition: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        command: str,
+        file: str | PathLike[str],
+        definition: Mapping[str, Any],
+        pictures: Mapping[str, str],
+    ) -> None:
         self.path = Path(path)
         if self.path.suffix != ".md":
             raise ValueError(f"a page is a file .md, not '{path}'")
@@ -136,6 +145,7 @@ class Page:
         self._parts: list[str] = []
         self._folded: list[str] = []
         self._data = b""
+        self._words, self._unused = dict(pictures) or PICTURES, set(pictures)
         self._pictures: dict[str, bytes] = {}
 
     def check(self, store: Store) -> None:
@@ -171,17 +181,24 @@ class Page:
         place.append(f"<details><summary>{one.caption or 'Table'}</summary>\n\n{text}\n</details>\n" if folded else text)
 
     def figure(self, name: str, figure: Figure) -> None:
-        """Add a figure, if it is of those on pages."""
-        if not name.endswith(PICTURES):
+        """Add a figure and the words of the longest end of its name, if it is of those on the page."""
+        from PIL import Image
+
+        ends = [one for one in self._words if f"-{name}".endswith(f"-{one}")]
+        if not ends:
             return
-        content = io.BytesIO()
-        figure.savefig(content, format="png", dpi=100)
+        end, drawn, content = max(ends, key=len), io.BytesIO(), io.BytesIO()
+        self._unused.discard(end)
+        figure.savefig(drawn, format="png", dpi=DOTS)
+        Image.open(drawn).convert("RGB").quantize(SHADES, dither=Image.Dither.NONE).save(content, format="png", optimize=True)
         file = f"{self.path.stem}-{re.sub(r'[^A-Za-z0-9-]+', '-', name)}.png"
         self._pictures[file] = content.getvalue()
-        self._parts.append(f"![{name.replace('-', ' ')}]({file})\n")
+        self._parts += [f"![{name.replace('-', ' ')}]({file})\n", *([f"{self._words[end]}\n"] if self._words[end] else [])]
 
     def save(self, summary: StudySummary, study: Mapping[str, Any]) -> list[Path]:
-        """Write the page and its pictures; returns their paths."""
+        """Write the page and its pictures; returns their paths. Raises ValueError if a picture that the study states is none of its report."""
+        if self._unused:
+            raise ValueError(f"page: the report has no figure whose name ends with {', '.join(sorted(self._unused))}")
         times = [run.wall_time for run in summary.runs]
         of_processor = sum(run.history["cpu"][-1] for run in summary.runs if run.history.get("cpu"))
         code = merged(run.code for run in summary.runs)

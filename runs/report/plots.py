@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from macs.fronts.pictures.style import COLORS, GREY, STYLE, better, blank_figure, title_and_legend, wrapped
+from macs.fronts.pictures.style import COLORS, GREY, STYLE, better, blank_figure, wrapped
 from macs.io.text import counted
 from problems.compiled import Objective
 
@@ -31,7 +31,10 @@ PAPER: dict[str, Any] = {
     "legend.handlelength": 1.6,
 }
 MARKERS = "o^sDvPX*"
-"""One more than there are colours, so that no two of many solvers look alike."""
+TOGETHER = 3
+"""Most solvers in the same panels of a figure: the points of more hide each other."""
+Panels = list[tuple[Any, tuple[int, int]]]
+"""Axes, and the numbers of the objectives across and up."""
 
 
 def style() -> Any:
@@ -66,36 +69,85 @@ def front_figure(
     goals: Sequence[Objective],
     reference: Points | None = None,
     marked: Points | None = None,
+    printed: Points | None = None,
     truth_name: str = "truth",
 ) -> Figure:
-    """All points of all runs: one colour and marker a solver, the truth as a line where it is a curve."""
+    """All points of all runs, the truth as a line where it is a curve, and diamonds at points that a paper prints.
+
+    Up to three solvers are drawn in the same panels, a colour and a marker each, in all planes of two objectives. Of more each has a column
+    of panels, of the first objective and each other, above the reference, or else the points of all.
+    """
     m, signs = len(goals), np.array([goal.sign for goal in goals])
-    pairs = list(combinations(range(m), 2))
+    parts = {solver: [minimised(front, goals) * signs for front in runs] for solver, runs in fronts.items() if runs}
+    every = {solver: np.vstack([one for one in found if len(one)] or [np.empty((0, m))]) for solver, found in parts.items()}
+    names = {solver: _runs(solver, len(found), sum(not len(one) for one in found)) for solver, found in parts.items()}
+    places = {solver: k for k, solver in enumerate(fronts)}  # also of those without runs: others keep their colours of all figures
+    theirs = minimised(np.empty((0, m)) if printed is None else printed, goals) * signs
+    behind = np.vstack([np.empty((0, m)), *every.values()] if reference is None else [truth(reference, goals) * signs])
+    apart = len(every) > TOGETHER
+    with style():
+        if apart:
+            figure, columns = _panels([*names.values()], goals, np.vstack([behind, theirs, *every.values()]))
+        else:
+            figure, columns = _planes(goals)
+        for column, drawn in zip(columns, [[one] for one in every] if apart else [[*every]], strict=True):
+            for ax, pair in column:
+                if reference is not None:
+                    _draw_truth(ax, reference, goals, pair, truth_name)
+                elif apart:
+                    ax.plot(*behind[:, pair].T, ".", color="#bbbbbb", ms=3.0, mew=0.0, zorder=1, label="all solvers")
+                for one in drawn:
+                    look = {"ms": 2.4, "mew": 0.0} if apart else {"ms": 3.2, "mew": 0.3, "mec": "white", "label": names[one]}
+                    marker, color = MARKERS[0 if apart else places[one] % len(MARKERS)], COLORS[places[one] % len(COLORS)]
+                    ax.plot(*every[one][:, pair].T, marker, ls="", zorder=3, alpha=0.65, color=color, **look)
+                if marked is not None:
+                    _mark(ax, (minimised(marked, goals) * signs)[:, pair], signs[[*pair]])
+                if len(theirs):
+                    ax.plot(*theirs[:, pair].T, "D", color="black", mfc="none", mew=0.9, ms=4.5, zorder=5, label="printed in the paper")
+        legend(figure, columns[0][0][0])
+    return figure
+
+
+def _planes(goals: Sequence[Objective]) -> tuple[Any, list[Panels]]:
+    """A figure of all planes of two objectives."""
+    pairs = list(combinations(range(len(goals)), 2))
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
-    # A label beside a panel leaves room for its neighbours and powers of ten.
-    room = 0.6 * (COLUMN if m == 2 else PAGE / 3.0)
-    with style():
-        figure = new_figure(COLUMN if m == 2 else PAGE, 2.7 if m == 2 else 2.3 * rows + 0.3)
-        grid = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, (i, j) in zip(grid, pairs, strict=False):
-            if reference is not None:
-                _draw_truth(ax, reference, goals, (i, j), truth_name)
-            for k, (solver, runs) in enumerate(fronts.items()):
-                if not runs:  # none is finished; other solvers keep their colours of all figures
-                    continue
-                points = [minimised(front, goals) * signs for front in runs]
-                name = _runs(solver, len(runs), sum(not len(part) for part in points))
-                every = np.vstack([part for part in points if len(part)] or [np.empty((0, m))])
-                look = {"ms": 3.2, "mew": 0.3, "mec": "white", "alpha": 0.65, "color": COLORS[k % len(COLORS)]}
-                ax.plot(every[:, i], every[:, j], MARKERS[k % len(MARKERS)], ls="", zorder=3, label=name, **look)
-            if marked is not None:
-                _mark(ax, (minimised(marked, goals) * signs)[:, [i, j]], signs[[i, j]])
-            ax.set(xlabel=wrapped(better(goals[i]), room, 8.0), ylabel=wrapped(better(goals[j]), room, 8.0))
-        for ax in grid[len(pairs) :]:
-            ax.remove()
-        legend(figure, grid[0])
-    return figure
+    figure = new_figure(COLUMN if rows == columns == 1 else PAGE, 2.7 if len(pairs) == 1 else 2.3 * rows + 0.3)
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, (i, j) in zip(grid, pairs, strict=False):
+        # A label beside a panel leaves room for its neighbours and powers of ten.
+        room = 0.6 * figure.get_figwidth() / columns
+        ax.set(xlabel=wrapped(better(goals[i]), room, 8.0), ylabel=wrapped(better(goals[j]), room, 8.0))
+    for ax in grid[len(pairs) :]:
+        ax.remove()
+    return figure, [[*zip(grid, pairs, strict=False)]]
+
+
+def _panels(titles: Sequence[str], goals: Sequence[Objective], every: np.ndarray) -> tuple[Any, list[Panels]]:
+    """A figure with a column of panels for each title, of the first objective and each other; the ends of axes are those of some points."""
+    low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else np.array([[0.0], [1.0]]) * np.ones(len(goals))
+    margin = 0.04 * np.where(high > low, high - low, 1.0)
+    others = range(1, len(goals))
+    blocks = -(-len(titles) // (3 if len(others) == 1 else 5))
+    columns = -(-len(titles) // blocks)
+    width, height = COLUMN if columns == 1 else PAGE, 2.0 if len(others) == 1 else 1.15
+    figure = new_figure(width, (height * len(others) + 0.35) * blocks + 0.2)
+    grid = figure.subplots(len(others) * blocks, columns, squeeze=False)
+    found: list[Panels] = []
+    for k, title in enumerate(titles):
+        block, column = divmod(k, columns)
+        found.append([(grid[len(others) * block + j - 1, column], (0, j)) for j in others])
+        for ax, (_, j) in found[-1]:
+            ax.set(xlim=(low[0] - margin[0], high[0] + margin[0]), ylim=(low[j] - margin[j], high[j] + margin[j]))
+            lowest = j == others[-1] and k + columns >= len(titles)
+            ax.tick_params(labelbottom=lowest, labelleft=column == 0)
+            ax.set_xlabel(wrapped(better(goals[0]), 0.9 * width / columns, 8.0) if lowest else "")
+            ax.set_ylabel(wrapped(better(goals[j]), 0.9 * height, 8.0) if column == 0 else "")
+        found[-1][0][0].set_title(wrapped(title, 0.9 * width / columns, 8.0), loc="left")
+    for ax in grid[-len(others) :, columns - -len(titles) % columns :].ravel():
+        ax.remove()
+    return figure, found
 
 
 def attainment_figure(
@@ -103,33 +155,22 @@ def attainment_figure(
 ) -> Figure:
     """Best, median and worst attainment surface of each solver, of two objectives: a panel a solver, all with the same axes.
 
-    The area between best and worst is shaded. A surface that is empty, because runs are, is not drawn; the legend names it.
+    The area between best and worst is shaded. A surface that is empty, because runs are, is not drawn; the title names it.
     """
     signs = np.array([goal.sign for goal in goals])
-    corners = [one for surface in surfaces.values() for one in surface.corners]
+    corners = [np.zeros((0, 2)), *(one for surface in surfaces.values() for one in surface.corners)]
     if reference is not None:
         corners.append(truth(reference, goals) * signs)
-    every = np.vstack([*corners, np.zeros((0, 2))])
-    low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else (np.zeros(2), np.ones(2))
-    margin = 0.04 * np.where(high > low, high - low, 1.0)
-    ends = np.where(signs > 0, high + margin, low - margin)
-    columns = min(3, len(surfaces))
-    rows = -(-len(surfaces) // columns)
     with style():
-        width = COLUMN if columns == 1 else PAGE
-        figure = new_figure(width, 2.6 * rows)
-        grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
-        for k, (ax, (solver, surface)) in enumerate(zip(grid, surfaces.items(), strict=False)):
+        figure, columns = _panels([*map(_attained, surfaces, surfaces.values())], goals, np.vstack(corners))
+        for k, (((ax, pair),), surface) in enumerate(zip(columns, surfaces.values(), strict=True)):
             if reference is not None:
-                _draw_truth(ax, reference, goals, (0, 1), truth_name)
+                _draw_truth(ax, reference, goals, pair, truth_name)
+            ends = np.array([limits[int(sign > 0)] for limits, sign in zip((ax.get_xlim(), ax.get_ylim()), signs, strict=True)])
             _draw_surfaces(ax, surface, ends, COLORS[k % len(COLORS)])
-            ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
-            ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
-            ax.set(xlabel=better(goals[0]), ylabel=better(goals[1]))
-            ax.label_outer()
-            title_and_legend(ax, wrapped(_runs(solver, surface.runs, 0), width / columns - 0.3, 8.0))  # the axis has numbers of 0.3 inches
-        for ax in grid[len(surfaces) :]:
-            ax.remove()
+        legend(figure, columns[0][0][0])
+        for line in figure.legends[0].get_lines()[-3:]:  # of all colours
+            line.set_color(GREY)
     return figure
 
 
@@ -166,7 +207,7 @@ def convergence_figure(
             ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)
         else:
             ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
-        ax.set(xlim=(0, last or 1.0), xlabel=xlabel, ylabel=ylabel)
+        ax.set(xlim=(0, last or 1.0), xlabel=xlabel, ylabel=wrapped(ylabel, 2.0, 8.0))
         legend(figure, ax, "median, quartiles")
     return figure
 
@@ -180,6 +221,12 @@ def _log_axis(ax: Any, ratio: float) -> None:
         ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio > 5 else tuple(range(1, 10))))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _attained(solver: str, surface: Attainment) -> str:
+    """MACS, 30 runs (worst: not attained)."""
+    none = [name for name, corners in (("median", surface.median), ("worst", surface.worst)) if not len(corners)]
+    return f"{_runs(solver, surface.runs, 0)}{f' ({none[0]}: not attained)' if none else ''}"
 
 
 def _runs(solver: str, runs: int, empty: int) -> str:
@@ -215,9 +262,7 @@ def _draw_surfaces(ax: Any, surface: Attainment, ends: np.ndarray, color: str) -
     ):
         if len(corners):
             drawn[name] = staircase(corners, surface.signs, ends)
-            ax.plot(*drawn[name].T, color=color, label=name, zorder=4, **look)
-        else:
-            ax.plot([], [], color=color, label=f"{name}: not attained", **look)
+        ax.plot(*drawn.get(name, np.empty((0, 2))).T, color=color, label=name, zorder=4, **look)
     if "best" in drawn and "worst" in drawn:
         border = np.vstack([drawn["best"], drawn["worst"][::-1]])
         ax.fill(*border.T, color=color, alpha=0.18, lw=0, zorder=3)

@@ -92,6 +92,10 @@ class PublishedTable(Section, tag_field="of", kw_only=True):
         """A sentence on how our figures were obtained."""
         return self.how
 
+    def printed(self, comparison: Comparison) -> list[list[float]]:
+        """The objectives of points that the paper prints, which figures of fronts show."""
+        return []
+
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         """Raise ValueError if the table cannot be of this problem."""
 
@@ -162,10 +166,14 @@ class Indicators(PublishedTable, tag="indicators"):
         return f"{own}; for all solvers together, {scale[0].lower()}{scale[1:]}. Variance with divisor n - 1."
 
 
+Point = Annotated[list[Number], Meta(min_length=1, description="a list of numbers, one for each objective")]
+
+
 class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):
     """The volume up to a point in the users' units: best, median and worst of all runs; a failed run has none."""
 
-    point: Annotated[list[Number], Meta(min_length=1, description="a list of numbers, one for each objective")]
+    point: Point
+    points: list[Point] = []  # of the paper's front, where it prints them
 
     columns: ClassVar[Mapping[str, Head]] = {key: Head(key, digits=5) for key in ("best", "median", "worst")}
 
@@ -179,10 +187,14 @@ class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):
         best = comparison.reference(None)
         return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, self.point):.5g}."
 
+    def printed(self, comparison: Comparison) -> list[list[float]]:
+        return self.points if comparison.problem in {row["problem"] for row in self.rows} else []
+
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
-        if len(self.point) != len(problem.goals):
-            names = ", ".join(goal.name for goal in problem.goals)
-            raise ValueError(f"point: {len(self.point)} numbers, but {len(problem.goals)} objectives: {names}")
+        for one in (self.point, *self.points):
+            if len(one) != len(problem.goals):
+                names = ", ".join(goal.name for goal in problem.goals)
+                raise ValueError(f"point: {len(one)} numbers, but {len(problem.goals)} objectives: {names}")
 
 
 class Measure(Section):
@@ -306,6 +318,10 @@ class PayoffTable(PublishedTable, tag="payoff"):
                 best = objectives[np.lexsort(keys[:, order[::-1]].T)[0]].tolist()
                 rows.append({STATISTIC: BEST + goal.name, **dict(zip(comparison.known.names, best, strict=True))})
         return rows
+
+    def printed(self, comparison: Comparison) -> list[list[float]]:
+        mine = [row for row in self.rows if row["problem"] == comparison.problem]
+        return [[row[name] for name in comparison.known.names] for row in mine if {*comparison.known.names} <= row.keys()]
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         check_known(STATISTIC, [row[STATISTIC] for row in self.rows], {BEST + goal.name: goal.name for goal in problem.goals})

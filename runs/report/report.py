@@ -19,7 +19,7 @@ from macs.io.atomic import write_whole
 from macs.io.text import counted
 
 from ..batch.store import Store
-from ..files import Flag, FurtherFigures, Text, check_trusted, checked, errors_begin_with
+from ..files import Flag, Text, check_trusted, checked, errors_begin_with
 from ..measures.attainment import attainment
 from ..measures.references import ReferenceKey, read, reference_addresses
 from .choices import choices_figures, choices_tables, only_single_points
@@ -52,7 +52,6 @@ class ReportKeys(msgspec.Struct):
     reference: ReferenceKey = None
     nominal: Text | None = None
     flights: Flag = True
-    figures: FurtherFigures = ()
     note: Text = ""
 
 
@@ -117,7 +116,7 @@ def report(
 def _section(comparison: Comparison, study: Mapping[str, Any], writer: _Writer, drawn: bool) -> list[str]:
     """The tables of a comparison as text, written to files with its figures."""
     tables = tables_of(comparison, study)
-    figures = _figures(comparison, study.get("figures", ())) if drawn else {}
+    figures = _figures(comparison, study) if drawn else {}
     shown: Flights | VariablesAlongFront | None = None
     if study.get("flights", True):
         shown = Flights.of(comparison) or VariablesAlongFront.of(comparison)
@@ -171,22 +170,23 @@ def _left_out(comparison: Comparison) -> list[str]:
     return ["\n".join(lines)] if lines else []
 
 
-def _figures(comparison: Comparison, further: Sequence[str]) -> dict[str, Figure]:
-    """{name of a file: figure} of a comparison, and `further` ones: "means" has the mean objectives of the front of each run."""
+def _figures(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Figure]:
+    """{name of a file: figure} of a comparison; "means" has the mean objectives of the front of each run."""
     reference = comparison.against
     name = "truth" if reference.true else "reference"
     found: dict[str, Figure] = choices_figures(comparison)
     if len(reference.front) < 2:
         return found
     goals, against = comparison.known.goals, None if reference.alone else reference.front
-    if "means" in further:
-        means = {solver: [one.objectives.mean(axis=0)[None] for one in fronts if len(one)] for solver, fronts in comparison.fronts.items()}
-        found["means"] = front_figure(means, goals=[replace(goal, name=f"mean {goal.name}") for goal in goals])
-    if len(goals) > 1:
-        found["fronts"] = front_figure(comparison.fronts, goals=goals, reference=against, truth_name=name)
+    printed = [point for paper in papers(study.get("paper") or []) for point in paper.printed(comparison)]
+    if len(goals) > 1 and (printed or not only_single_points(comparison)):
+        theirs = np.array(printed) if printed else None
+        found["fronts"] = front_figure(comparison.fronts, goals=goals, reference=against, printed=theirs, truth_name=name)
     if reference.alone or only_single_points(comparison):
         return found
     if len(goals) == 2:
+        means = {solver: [one.objectives.mean(axis=0)[None] for one in fronts if len(one)] for solver, fronts in comparison.fronts.items()}
+        found["means"] = front_figure(means, goals=[replace(goal, name=f"mean {goal.name}") for goal in goals])
         surfaces = {solver: attainment(fronts) for solver, fronts in comparison.attaining().items()}
         if surfaces:
             found["attainment"] = attainment_figure(surfaces, goals=goals, reference=reference.front, truth_name=name)
