@@ -93,9 +93,8 @@ class Study:
     flights : bool, default True
         Whether reports show the flights that stand for each front.
     pictures : mapping, optional
-        Which figures of the report the page of its results shows, with words below each: {end of a figure's name: words}, such as {"means":
-        "Figure 11 of the paper: ..."}; the longest end counts. Its page alone depends on them, no run does. Default: the fronts, and the
-        hypervolume over charged evaluations, without words.
+        Figures of the report on the page of its results, with words below each: {end of a figure's name: words}, such as {"means":
+        "Figure 11 of the paper: ..."}; the longest end counts, and no run depends on them. Default: `report.page.PICTURES`.
     note : str
         Text that stands at the beginning of the report.
     trust : bool
@@ -136,7 +135,7 @@ class Study:
     nominal: str | None = field(metadata=_key(), default=None)
     dispersions: Mapping[str, Any] | None = field(metadata=_key(), default=None)
     flights: bool = field(metadata=_key(Flag), default=True)
-    pictures: Mapping[str, str] = field(metadata=_key(dict[str, Text], record=None), default_factory=dict)
+    pictures: Mapping[str, str] = field(metadata=_key(dict[str, Text]), default_factory=dict)
     note: str = field(metadata=_key(Text), default="")
     trust: bool = field(default=True, repr=False)
     cells: tuple[Cell, ...] = field(init=False, repr=False)

@@ -294,8 +294,7 @@ def page_of(arguments: Namespace) -> Page:
     stated = f" --study {shlex.quote(arguments.study)}" if arguments.study else ""
     trusted = " --trust" if arguments.trust else ""
     command = f"macs study report {shlex.quote(arguments.folder)} --page {shlex.quote(arguments.page)}{stated}{trusted}"
-    study = Study.load(source, trust=arguments.trust)
-    return Page(arguments.page, command, studyfile.find(source), study.definition(), study.pictures)
+    return Page(arguments.page, command, studyfile.find(source), Study.load(source, trust=arguments.trust).definition())
 
 
 def page_report(arguments: Namespace) -> int:

@@ -121,21 +121,14 @@ def print_standing(pages: Iterable[Path], now: Now) -> bool:
 
 PICTURES = {"fronts": "", "hypervolume-over-charged-evaluations": ""}
 """Figures of a page by the ends of their names, and the words below each, unless its study states them."""
-DOTS, SHADES = 150, 256
-"""Dots per inch of pictures on a page, which shows them smaller than they are, and how many colours they have, so that files are small."""
+DOTS = 120
+"""Dots per inch of pictures on a page: enough for one as wide as the page."""
 
 
 class Page:
     """A page of a study, and its pictures beside it: NAME.md and NAME-FIGURE.png."""
 
-    def __init__(
-        self,
-        path: str | PathLike[str],
-        command: str,
-        file: str | PathLike[str],
-        definition: Mapping[str, Any],
-        pictures: Mapping[str, str],
-    ) -> None:
+    def __init__(self, path: str | PathLike[str], command: str, file: str | PathLike[str], definition: Mapping[str, Any]) -> None:
         self.path = Path(path)
         if self.path.suffix != ".md":
             raise ValueError(f"a page is a file .md, not '{path}'")
@@ -145,15 +138,14 @@ class Page:
         self._parts: list[str] = []
         self._folded: list[str] = []
         self._data = b""
-        self._words, self._unused = dict(pictures) or PICTURES, set(pictures)
+        self._words, self._unused = definition["pictures"] or PICTURES, set(definition["pictures"])
         self._pictures: dict[str, bytes] = {}
 
     def check(self, store: Store) -> None:
         """Raise ValueError unless a folder has all runs of the study as its file states it now."""
         store.check(self._definition)
-        different = [
-            key for key, value in self._definition.items() if key not in ("cells", "objectives") and store.definition.get(key) != value
-        ]
+        others = {key: value for key, value in self._definition.items() if key not in ("cells", "objectives", "pictures")}
+        different = [key for key, value in others.items() if store.definition.get(key) != value]
         if different:
             raise ValueError(
                 f"page: {', '.join(different)} of the study changed after its last run; `macs study run` again takes them over, "
@@ -184,19 +176,19 @@ class Page:
         """Add a figure and the words of the longest end of its name, if it is of those on the page."""
         from PIL import Image
 
-        ends = [one for one in self._words if f"-{name}".endswith(f"-{one}")]
-        if not ends:
+        end = max((one for one in self._words if f"-{name}".endswith(f"-{one}")), key=len, default=None)
+        if end is None:
             return
-        end, drawn, content = max(ends, key=len), io.BytesIO(), io.BytesIO()
+        drawn, content = io.BytesIO(), io.BytesIO()
         self._unused.discard(end)
         figure.savefig(drawn, format="png", dpi=DOTS)
-        Image.open(drawn).convert("RGB").quantize(SHADES, dither=Image.Dither.NONE).save(content, format="png", optimize=True)
+        Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE).save(content, format="png", optimize=True)
         file = f"{self.path.stem}-{re.sub(r'[^A-Za-z0-9-]+', '-', name)}.png"
         self._pictures[file] = content.getvalue()
         self._parts += [f"![{name.replace('-', ' ')}]({file})\n", *([f"{self._words[end]}\n"] if self._words[end] else [])]
 
     def save(self, summary: StudySummary, study: Mapping[str, Any]) -> list[Path]:
-        """Write the page and its pictures; returns their paths. Raises ValueError if a picture that the study states is none of its report."""
+        """Write the page and its pictures; returns their paths. Raises ValueError if its report has no picture that the study states."""
         if self._unused:
             raise ValueError(f"page: the report has no figure whose name ends with {', '.join(sorted(self._unused))}")
         times = [run.wall_time for run in summary.runs]

@@ -33,8 +33,6 @@ PAPER: dict[str, Any] = {
 MARKERS = "o^sDvPX*"
 TOGETHER = 3
 """Most solvers in the same panels of a figure: the points of more hide each other."""
-Panels = list[tuple[Any, tuple[int, int]]]
-"""Axes, and the numbers of the objectives across and up."""
 
 
 def style() -> Any:
@@ -57,7 +55,7 @@ def legend(figure: Any, ax: Any, title: str = "") -> None:
     look = {"frameon": False, "title": title or None, "title_fontsize": 7, "alignment": "left"}
     for columns in range(min(len(names), 6), 0, -1):
         above = figure.legend(handles, names, loc="outside upper left", ncols=columns, **look)
-        if columns == 1 or above.get_window_extent().width <= figure.bbox.width:
+        if columns == 1 or above.get_window_extent().width <= 0.97 * figure.bbox.width:
             figure.set_figheight(figure.get_figheight() + 0.16 * (-(-len(names) // columns) + bool(title)))
             return
         above.remove()
@@ -69,37 +67,33 @@ def front_figure(
     goals: Sequence[Objective],
     reference: Points | None = None,
     marked: Points | None = None,
-    printed: Points | None = None,
+    printed: Sequence[Sequence[float]] = (),
     truth_name: str = "truth",
 ) -> Figure:
     """All points of all runs, the truth as a line where it is a curve, and diamonds at points that a paper prints.
 
-    Up to three solvers are drawn in the same panels, a colour and a marker each, in all planes of two objectives. Of more each has a column
-    of panels, of the first objective and each other, above the reference, or else the points of all.
+    Up to three solvers share panels, all planes of two objectives; of more each has its own, of the first objective and each other.
     """
     m, signs = len(goals), np.array([goal.sign for goal in goals])
-    parts = {solver: [minimised(front, goals) * signs for front in runs] for solver, runs in fronts.items() if runs}
-    every = {solver: np.vstack([one for one in found if len(one)] or [np.empty((0, m))]) for solver, found in parts.items()}
-    names = {solver: _runs(solver, len(found), sum(not len(one) for one in found)) for solver, found in parts.items()}
-    places = {solver: k for k, solver in enumerate(fronts)}  # also of those without runs: others keep their colours of all figures
-    theirs = minimised(np.empty((0, m)) if printed is None else printed, goals) * signs
-    behind = np.vstack([np.empty((0, m)), *every.values()] if reference is None else [truth(reference, goals) * signs])
+    none = np.empty((0, m))
+    every = {solver: [none, *(minimised(front, goals) * signs for front in runs if len(front))] for solver, runs in fronts.items() if runs}
+    names = [_runs(solver, len(fronts[solver]), len(fronts[solver]) + 1 - len(found)) for solver, found in every.items()]
+    points, places = [*map(np.vstack, every.values())], [[*fronts].index(solver) for solver in every]  # colours are those of all figures
+    theirs = np.reshape(printed, (-1, m))
+    behind = np.vstack([none, *points]) if reference is None else truth(reference, goals) * signs
     apart = len(every) > TOGETHER
     with style():
-        if apart:
-            figure, columns = _panels([*names.values()], goals, np.vstack([behind, theirs, *every.values()]))
-        else:
-            figure, columns = _planes(goals)
-        for column, drawn in zip(columns, [[one] for one in every] if apart else [[*every]], strict=True):
+        figure, columns = _panels(names, goals, np.vstack([behind, theirs, *points])) if apart else _planes(goals)
+        for number, column in enumerate(columns):
             for ax, pair in column:
                 if reference is not None:
                     _draw_truth(ax, reference, goals, pair, truth_name)
                 elif apart:
-                    ax.plot(*behind[:, pair].T, ".", color="#bbbbbb", ms=3.0, mew=0.0, zorder=1, label="all solvers")
-                for one in drawn:
-                    look = {"ms": 2.4, "mew": 0.0} if apart else {"ms": 3.2, "mew": 0.3, "mec": "white", "label": names[one]}
-                    marker, color = MARKERS[0 if apart else places[one] % len(MARKERS)], COLORS[places[one] % len(COLORS)]
-                    ax.plot(*every[one][:, pair].T, marker, ls="", zorder=3, alpha=0.65, color=color, **look)
+                    ax.plot(*behind[:, pair].T, ".", color=GREY, alpha=0.5, ms=3.0, mew=0.0, zorder=1, label="all solvers")
+                for k in [number] if apart else range(len(points)):
+                    look = {"ms": 2.4, "mew": 0.0} if apart else {"ms": 3.2, "mew": 0.3, "mec": "white", "label": names[k]}
+                    marker, color = MARKERS[0 if apart else places[k] % len(MARKERS)], COLORS[places[k] % len(COLORS)]
+                    ax.plot(*points[k][:, pair].T, marker, ls="", zorder=3, alpha=0.65, color=color, **look)
                 if marked is not None:
                     _mark(ax, (minimised(marked, goals) * signs)[:, pair], signs[[*pair]])
                 if len(theirs):
@@ -108,8 +102,8 @@ def front_figure(
     return figure
 
 
-def _planes(goals: Sequence[Objective]) -> tuple[Any, list[Panels]]:
-    """A figure of all planes of two objectives."""
+def _planes(goals: Sequence[Objective]) -> tuple[Any, list[list[Any]]]:
+    """A figure of all planes of two objectives: its axes, each with the numbers of the objectives across and up."""
     pairs = list(combinations(range(len(goals)), 2))
     columns = min(3, len(pairs))
     rows = -(-len(pairs) // columns)
@@ -124,8 +118,8 @@ def _planes(goals: Sequence[Objective]) -> tuple[Any, list[Panels]]:
     return figure, [[*zip(grid, pairs, strict=False)]]
 
 
-def _panels(titles: Sequence[str], goals: Sequence[Objective], every: np.ndarray) -> tuple[Any, list[Panels]]:
-    """A figure with a column of panels for each title, of the first objective and each other; the ends of axes are those of some points."""
+def _panels(titles: Sequence[str], goals: Sequence[Objective], every: np.ndarray) -> tuple[Any, list[list[Any]]]:
+    """A figure with a column of axes for each title, of the first objective and each other, as far as `every` point."""
     low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else np.array([[0.0], [1.0]]) * np.ones(len(goals))
     margin = 0.04 * np.where(high > low, high - low, 1.0)
     others = range(1, len(goals))
@@ -134,7 +128,7 @@ def _panels(titles: Sequence[str], goals: Sequence[Objective], every: np.ndarray
     width, height = COLUMN if columns == 1 else PAGE, 2.0 if len(others) == 1 else 1.15
     figure = new_figure(width, (height * len(others) + 0.35) * blocks + 0.2)
     grid = figure.subplots(len(others) * blocks, columns, squeeze=False)
-    found: list[Panels] = []
+    found = list[list[Any]]()
     for k, title in enumerate(titles):
         block, column = divmod(k, columns)
         found.append([(grid[len(others) * block + j - 1, column], (0, j)) for j in others])
@@ -162,7 +156,8 @@ def attainment_figure(
     if reference is not None:
         corners.append(truth(reference, goals) * signs)
     with style():
-        figure, columns = _panels([*map(_attained, surfaces, surfaces.values())], goals, np.vstack(corners))
+        titles = [_runs(solver, one.runs, 0) + " (worst: not attained)" * (not len(one.worst)) for solver, one in surfaces.items()]
+        figure, columns = _panels(titles, goals, np.vstack(corners))
         for k, (((ax, pair),), surface) in enumerate(zip(columns, surfaces.values(), strict=True)):
             if reference is not None:
                 _draw_truth(ax, reference, goals, pair, truth_name)
@@ -182,7 +177,7 @@ def convergence_figure(
     Where half of the runs have nothing yet there is no line; where a quarter has nothing, the band is open towards the worse side.
     """
     with style():
-        figure = new_figure(COLUMN, 2.5)
+        figure = new_figure(COLUMN if len(histories) <= TOGETHER + 1 else PAGE, 2.5)
         ax = figure.subplots()
         bands = {solver: band(runs, larger=larger) for solver, runs in histories.items()}
         values = np.concatenate([part for b in bands.values() for part in (b.lower, b.median, b.upper)])
@@ -223,12 +218,6 @@ def _log_axis(ax: Any, ratio: float) -> None:
     ax.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _attained(solver: str, surface: Attainment) -> str:
-    """MACS, 30 runs (worst: not attained)."""
-    none = [name for name, corners in (("median", surface.median), ("worst", surface.worst)) if not len(corners)]
-    return f"{_runs(solver, surface.runs, 0)}{f' ({none[0]}: not attained)' if none else ''}"
-
-
 def _runs(solver: str, runs: int, empty: int) -> str:
     """MACS, 30 runs (2 empty)."""
     return f"{solver}, {counted(runs, 'run')}{f' ({empty} empty)' if empty else ''}"
@@ -240,7 +229,7 @@ def _draw_truth(ax: Any, reference: Points, goals: Sequence[Objective], pair: tu
     for k, curve in enumerate(curves):
         ax.plot(*(curve * signs).T, color="black", lw=0.9, zorder=2, label=name if k == 0 else None)
     if not curves:
-        ax.plot(*(truth(reference, goals) * signs)[:, pair].T, ".", color=GREY, ms=2.0, zorder=1, label=name)
+        ax.plot(*(truth(reference, goals) * signs)[:, pair].T, ".", color=GREY, alpha=0.5, ms=2.5, zorder=1, label=name)
 
 
 def _mark(ax: Any, places: np.ndarray, signs: np.ndarray) -> None:

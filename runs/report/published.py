@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 Figures = Mapping[str, Cell]
 """The figures of a row by key."""
+Point = Annotated[list[Number], Meta(min_length=1, description="a list of numbers, one for each objective")]
 STATISTICS: Mapping[str, Callable[[np.ndarray], float]] = {
     "greatest": np.max,
     "least": np.min,
@@ -92,9 +93,9 @@ class PublishedTable(Section, tag_field="of", kw_only=True):
         """A sentence on how our figures were obtained."""
         return self.how
 
-    def printed(self, comparison: Comparison) -> list[list[float]]:
+    def printed(self, comparison: Comparison) -> Sequence[Sequence[float]]:
         """The objectives of points that the paper prints, which figures of fronts show."""
-        return []
+        return ()
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         """Raise ValueError if the table cannot be of this problem."""
@@ -166,14 +167,11 @@ class Indicators(PublishedTable, tag="indicators"):
         return f"{own}; for all solvers together, {scale[0].lower()}{scale[1:]}. Variance with divisor n - 1."
 
 
-Point = Annotated[list[Number], Meta(min_length=1, description="a list of numbers, one for each objective")]
-
-
 class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):
     """The volume up to a point in the users' units: best, median and worst of all runs; a failed run has none."""
 
     point: Point
-    points: list[Point] = []  # of the paper's front, where it prints them
+    points: tuple[Point, ...] = ()  # of the paper's front, where it prints them
 
     columns: ClassVar[Mapping[str, Head]] = {key: Head(key, digits=5) for key in ("best", "median", "worst")}
 
@@ -187,8 +185,8 @@ class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):
         best = comparison.reference(None)
         return f"hypervolume in the objectives' units, up to {words}; that of {best.what} is {hypervolume_at(best.front, self.point):.5g}."
 
-    def printed(self, comparison: Comparison) -> list[list[float]]:
-        return self.points if comparison.problem in {row["problem"] for row in self.rows} else []
+    def printed(self, comparison: Comparison) -> Sequence[Sequence[float]]:
+        return self.points if comparison.problem in {row["problem"] for row in self.rows} else ()
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         for one in (self.point, *self.points):
@@ -319,9 +317,9 @@ class PayoffTable(PublishedTable, tag="payoff"):
                 rows.append({STATISTIC: BEST + goal.name, **dict(zip(comparison.known.names, best, strict=True))})
         return rows
 
-    def printed(self, comparison: Comparison) -> list[list[float]]:
-        mine = [row for row in self.rows if row["problem"] == comparison.problem]
-        return [[row[name] for name in comparison.known.names] for row in mine if {*comparison.known.names} <= row.keys()]
+    def printed(self, comparison: Comparison) -> Sequence[Sequence[float]]:
+        names = comparison.known.names
+        return [[row[name] for name in names] for row in self.rows if row["problem"] == comparison.problem and {*names} <= row.keys()]
 
     def check_problem(self, problem: CompiledProblem | CompiledVectorProblem) -> None:
         check_known(STATISTIC, [row[STATISTIC] for row in self.rows], {BEST + goal.name: goal.name for goal in problem.goals})

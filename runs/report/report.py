@@ -100,7 +100,9 @@ def report(
     sections = [str(summary), *([with_count(keys.note, study)] if keys.note else [])]
     for comparison in in_steps("report", found) if progress else found:
         sections += _section(comparison, study, writer, figures)
-    for part in _across(found, study):
+    for number, part in enumerate(_across(found, study)):
+        if number == 0:
+            writer.heading("All together", [])
         sections += [writer.table(name, one) for name, one in part.tables().items()]
         for name, figure in (part.figures() if figures else {}).items():
             writer.figure(name, figure)
@@ -180,8 +182,7 @@ def _figures(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, Figu
     goals, against = comparison.known.goals, None if reference.alone else reference.front
     printed = [point for paper in papers(study.get("paper") or []) for point in paper.printed(comparison)]
     if len(goals) > 1 and (printed or not only_single_points(comparison)):
-        theirs = np.array(printed) if printed else None
-        found["fronts"] = front_figure(comparison.fronts, goals=goals, reference=against, printed=theirs, truth_name=name)
+        found["fronts"] = front_figure(comparison.fronts, goals=goals, reference=against, printed=printed, truth_name=name)
     if reference.alone or only_single_points(comparison):
         return found
     if len(goals) == 2:

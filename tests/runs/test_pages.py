@@ -2,6 +2,7 @@
 
 import csv
 import hashlib
+import re
 import shutil
 from dataclasses import replace
 from datetime import date
@@ -71,6 +72,22 @@ def test_a_page_has_tables_pictures_and_where_they_are_from(place, capsys):
     assert all(float(row["IGD"]) >= 0 and float(row["time [s]"]) > 0 for row in rows) and "[CSV](small.csv)" in text
     pictures = [line.split("](")[1].rstrip(")") for line in text.splitlines() if line.startswith("![")]
     assert len(pictures) == 2 and all((place / one).read_bytes().startswith(b"\x89PNG") for one in pictures)
+
+
+@pytest.mark.slow
+def test_a_study_says_which_pictures_its_page_has_and_what_stands_below_them(place, capsys):
+    def stated(words: str) -> int:
+        (place / "small.toml").write_text(TOML.replace("[solvers]", f"[pictures]\n{words}\n[solvers]"))
+        return page_of(place)
+
+    try:
+        assert stated('paths = "Figure 2: paths."\n"dfet-2x3-fronts" = "Figure 1: fronts."') == 0
+        text = (place / "small.md").read_text()
+        pictures = re.findall(r"^!\[.*\]\((.*)\)\n\n(.*)$", text, re.MULTILINE)
+        assert pictures == [(f"small-goddard-dfet-2x3-{one}.png", f"Figure {k}: {one}.") for k, one in ((1, "fronts"), (2, "paths"))]
+        assert stated('fronts = ""\n"dfet-2x3-fronts" = ""\nronts = ""') == 2 and "ends with fronts, ronts" in capsys.readouterr().err
+    finally:
+        (place / "small.toml").write_text(TOML)
 
 
 @pytest.mark.slow

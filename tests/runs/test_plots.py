@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from synthetic_fronts import flights
 
+from macs.fronts.pictures.style import COLORS
 from macs.pareto.dominance import nondominated
 from problems.compiled import Objective
 from runs.measures.attainment import attainment, band, staircase
@@ -45,6 +46,20 @@ def test_more_objectives_are_drawn_in_pairs():
     assert len(figure.axes) == 6 and figure.axes[5].get_xlabel() == "← objective 3"
 
 
+def test_each_of_many_solvers_has_panels_of_its_own_above_what_all_found_and_what_a_paper_prints():
+    goals = [Objective(f"objective {i}") for i in range(1, 5)]
+    fronts = {f"solver {k}": [k * np.eye(4)] for k in range(6)} | {"none": []}
+    figure = front_figure(fronts, goals=goals, printed=[[1.0, 2.0, 3.0, 9.0]])
+    assert {ax.get_title(loc="left") for ax in figure.axes} == {"", *(f"solver {k}, 1 run" for k in range(6))}
+    assert len(figure.axes) == 18 and figure.axes[-1].get_ylim()[1] > 9.0, "three planes of each, one end of each axis"
+    last = next(ax for ax in figure.axes if ax.get_title(loc="left") == "solver 5, 1 run")
+    drawn = lines(last)
+    assert drawn["printed in the paper"].tolist() == [[1, 2]] and len(drawn["all solvers"]) == 24
+    assert [5.0, 0.0] in last.get_lines()[1].get_xydata().tolist() and last.get_lines()[1].get_color() == COLORS[5]
+    three = front_figure(dict([*fronts.items()][:3]), goals=goals, reference=np.eye(4), printed=[[1.0, 2.0, 3.0, 9.0]])
+    assert len(three.axes) == 6 and lines(three.axes[5])["printed in the paper"].tolist() == [[3, 9]]
+
+
 def test_surfaces_are_staircases():
     figure = attainment_figure(
         {"ours": attainment([foreign(A, GOALS), foreign(B, GOALS)]), "theirs": attainment([A * [1, -1]])}, goals=GOALS
@@ -58,8 +73,8 @@ def test_surfaces_are_staircases():
     assert np.all((steps == 0).any(axis=1)), "up or across, never both"
     assert second.get_title(loc="left") == "theirs, 1 run" and second.get_xlim() == first.get_xlim()
     empty = attainment_figure({"ours": attainment([foreign(A, GOALS), foreign(EMPTY, GOALS)])}, goals=GOALS, reference=TRUTH)
-    legends = (*(ax.get_legend() for ax in empty.axes if ax.get_legend()), *empty.legends)
-    assert "worst: not attained" in [text.get_text() for one in legends for text in one.get_texts()]
+    assert empty.axes[0].get_title(loc="left").endswith("(worst: not attained)")
+    assert [text.get_text() for text in empty.legends[0].get_texts()] == ["truth", "best", "median", "worst"]
 
 
 @pytest.mark.parametrize("log", [True, False])

@@ -18,7 +18,7 @@ from runs.cli import main
 from runs.execution.task import RunOutcome
 from runs.measures.references import look_up
 from runs.report.comparison import comparisons
-from runs.report.published import published_tables
+from runs.report.published import papers, published_tables
 from runs.report.report import _Writer, report
 from runs.report.tables import table
 
@@ -44,7 +44,6 @@ def study(**more) -> Study:
         "verify": None,
         "goal": GOAL,
         "note": "Gliders.",
-        "figures": ["means"],
     }
     return Study("gliders", **given | more)
 
@@ -244,6 +243,7 @@ MISS = [{"name": "miss", "state": "y", "at": 1}]
     ("paper", "message"),
     [
         ({"of": "hypervolume", "point": [1.0, 2.0, 3.0], "rows": [{**ROW, "best": 3}]}, "'glide': point: 3 numbers, but 2 objectives"),
+        ({"of": "hypervolume", "point": [1.0, 2.0], "points": [[1.0]], "rows": [{**ROW, "best": 3}]}, "point: 1 numbers"),
         ({"of": "hypervolume", "point": [1.0, 2.0], "rows": [{**ROW, "problem": "glid", "best": 3}]}, "row 1: unknown problem 'glid'"),
         ({"of": "objectives", "rows": [MEAN | {"time": 1}, {**MEAN, "by": "x", "range": 2}]}, "row 2: unknown objective 'range'; there"),
         ({"of": "objectives", "measures": MISS, "rows": [MEAN | {"miss": 1}]}, "'miss': unknown state 'y'; there are x"),
@@ -256,6 +256,14 @@ def test_a_paper_section_of_what_the_study_does_not_have_is_refused_at_once(pape
     with pytest.raises(ValueError) as refused:
         study(paper=[PAPER[0], paper])
     assert f"study 'gliders': [[paper]] 2, of {paper['of']}: " in str(refused.value) and message in str(refused.value)
+
+
+def test_points_that_a_paper_prints_are_those_of_its_payoff_table_and_of_its_front(folder):
+    [comparison] = comparisons(Store.open(folder), {})
+    ends = [{**ROW, "statistic": "best time", "time": 1, "distance": 2}, {**ROW, "statistic": "best distance", "distance": 9}]
+    volume = {"of": "hypervolume", "point": [1.0, 2.0], "points": [[3.0, 4.0]], "rows": [{**ROW, "best": 3}]}
+    found = [one.printed(comparison) for one in papers([{"of": "payoff", "rows": ends}, volume, *PAPER])]
+    assert found == [[[1, 2]], ([3.0, 4.0],), (), (), ()]
 
 
 def test_labels_that_differ_in_signs_alone_have_files_of_their_own(tmp_path):
