@@ -121,8 +121,6 @@ def print_standing(pages: Iterable[Path], now: Now) -> bool:
 
 PICTURES = {"fronts": "", "hypervolume-over-charged-evaluations": ""}
 """Figures of a page by the ends of their names, and the words below each, unless its study states them."""
-DOTS = 120
-"""Dots per inch of pictures on a page: enough for one as wide as the page."""
 
 
 class Page:
@@ -181,7 +179,7 @@ class Page:
             return
         drawn, content = io.BytesIO(), io.BytesIO()
         self._unused.discard(end)
-        figure.savefig(drawn, format="png", dpi=DOTS)
+        figure.savefig(drawn, format="png", dpi=120)  # enough for one as wide as the page
         Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE).save(content, format="png", optimize=True)
         file = f"{self.path.stem}-{re.sub(r'[^A-Za-z0-9-]+', '-', name)}.png"
         self._pictures[file] = content.getvalue()
