@@ -31,7 +31,7 @@ PAPER: dict[str, Any] = {
     "legend.handlelength": 1.6,
 }
 MARKERS = "o^sDvPX*"
-TOGETHER = 3
+OVERLAID = 3
 """Most solvers in the same panels of a figure: the points of more hide each other."""
 
 
@@ -81,7 +81,7 @@ def front_figure(
     points, places = [*map(np.vstack, every.values())], [[*fronts].index(solver) for solver in every]  # colours are those of all figures
     theirs = np.reshape(printed, (-1, m))
     behind = np.vstack([none, *points]) if reference is None else truth(reference, goals) * signs
-    apart = len(every) > TOGETHER
+    apart = len(every) > OVERLAID
     with style():
         figure, columns = _panels(names, goals, np.vstack([behind, theirs, *points])) if apart else _planes(goals)
         for number, column in enumerate(columns):
@@ -177,7 +177,7 @@ def convergence_figure(
     Where half of the runs have nothing yet there is no line; where a quarter has nothing, the band is open towards the worse side.
     """
     with style():
-        figure = new_figure(COLUMN if len(histories) <= TOGETHER + 1 else PAGE, 2.5)
+        figure = new_figure(COLUMN if len(histories) <= OVERLAID + 1 else PAGE, 2.5)
         ax = figure.subplots()
         bands = {solver: band(runs, larger=larger) for solver, runs in histories.items()}
         values = np.concatenate([part for b in bands.values() for part in (b.lower, b.median, b.upper)])
