@@ -16,7 +16,7 @@ front.plot_trajectories([0, 3, 7])
 # What was learned
 #
 # All flights lift up at first and, with one roll that is as fast as the bank rate allows, down after the lowest point. A deeper
-# and shorter passage needs less heat shield and leaves the air more steeply, which the burn pays for. The knee is near #2: from
-# 36.8 to 40.4 m/s the shield falls from 9.0 to 8.0 %, and the rest, to 7.1 %, takes a burn of up to 100 m/s. At #7 the front ends
+# and shorter passage needs less heat shield and leaves the air more steeply, which the burn pays for. The knee is near #3: from
+# 36.8 to 46.9 m/s the shield falls from 9.0 to 7.7 %, and the rest, to 7.1 %, takes a burn of up to 100 m/s. At #7 the front ends
 # with the steepest exit that the problem allows. Eight points took 16 gradient solves from one start, on meshes that were refined
 # until a simulation agreed.

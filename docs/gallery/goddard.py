@@ -27,7 +27,7 @@ front.plot_trajectories([0, 4, 9])
 
 # What was learned
 #
-# More time buys horizontal speed, and the first seconds buy most: the knee of the front is near point #2, beyond which speed
+# More time buys horizontal speed, and the first seconds buy most: the knee of the front is near point #3, beyond which speed
 # grows evenly with time. The quickest ascent thrusts straight up and then straight down, on both bounds of the angle, and has no
 # horizontal speed; along the front the angle becomes a smooth tangent law, and no bound acts but the longest time of 250 s. All
 # points are verified. They differ most from the closed form at the quickest ascent, where the front is vertical. Most of the work

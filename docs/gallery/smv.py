@@ -22,5 +22,5 @@ front.plot_trajectories(some)
 # quickest, goes up steeply with full thrust; #6 burns longest, and leaves with the greatest speed that is allowed; #9 burns for some
 # seconds only, keeps 86447 kg, and has turned to the other side on its way down. #4 is a compromise. Speed is bought with propellant:
 # the lines of speed and mass cross. The heat load differs by a tenth only. Ends of this front give up a little of their own objective
-# for much in others: a flight that keeps a little more than #9 is known, and
-# takes far longer, with far more heat. Points are local optima: a quicker flight than #0 is known, too.
+# for much in others: a flight that keeps a little more mass than #9 is known, which takes far longer, with far more heat. Points are
+# local optima: a quicker flight than #0 is known, too.

@@ -16,7 +16,7 @@ front.plot_variables()
 
 # What was learned
 #
-# Cost and deflection are in hard conflict: each further dollar buys less stiffness, and the knee of the front is between #3 and #5.
+# Cost and deflection are in hard conflict: each further dollar buys less stiffness, and the knee of the front is near #6.
 # The height of the beam is at its bound of 10 in nearly all along the front, its width makes the compromise up to 5 in, and at the
 # cheap end the weld is nearly as thick as the beam is wide. Along the stiff part the weld wanders: there it hardly counts in the
 # cost, and a search without derivatives does not settle it. The search ended by itself; the cheapest beam, where limits meet, is what
