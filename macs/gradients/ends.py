@@ -18,7 +18,7 @@ from ..io.workers import TOGETHER
 from ..pareto.directions import divisions_below, simplex_lattice
 from ..pareto.dominance import ranges
 from .multistart import MULTISTART, MultistartSolver
-from .scalarised import END, WEAK, WORK, Scalarised, strongly_optimal, without_loss
+from .scalarised import CLEARLY, END, WEAK, WORK, Scalarised, strongly_optimal, without_loss
 
 METHODS = ("pascoletti-serafini", "epsilon")
 """Scalarisations of a sweep."""
@@ -58,7 +58,9 @@ def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved]
             _from_each_other(solver, optima, tried)
             for i in range(m):
                 if optima[i] is not ends[i]:
-                    ends[i] = end = _lexicographic(solver, i, optima)
+                    # None takes what is meant for the others.
+                    with solver.solves.within(solver.solves.left / (m - i)):
+                        ends[i] = end = _lexicographic(solver, i, optima)
                     solver.solves.counts.keep(end is not optima[i] and end.message != WEAK)
             if all(one is end for one, end in zip(optima, ends, strict=True)):
                 break
@@ -124,11 +126,12 @@ def _lexicographic(solver: MultistartSolver, i: int, optima: Sequence[Solved]) -
             with solver.solves.at_most(END.ties):
                 (best,) = solver.over_values([best], [Scalarised.single(j, m, limits + slack)])
                 task = Scalarised.single(j, m, limits)
-                best = without_loss(solver.from_vector, solver.solves.tolerance, best, task, slack, [optima[j].z])
+                best = without_loss(solver.from_vector, solver.nlp, solver.solves.tolerance, best, task, slack, [optima[j].z])
             weak |= best.message == WEAK
         before.append(j)
     # A range may be no more than rounding, where objectives are in no conflict: no solve can tell such a loss.
-    if best.F[i] - least > MULTISTART.excess * max(spans[i], nlp_scales(solver.nlp)[i]):
+    held = solver.is_least(best, Scalarised.single(i, m))
+    if not held and best.F[i] - least > MULTISTART.excess * max(spans[i], nlp_scales(solver.nlp)[i]):
         # What was lost for the others is worth a little of what they gained.
         near = np.where(np.arange(m) == i, np.inf, best.F + END.slack * spans)
         with solver.solves.at_most(END.ties):
@@ -178,7 +181,7 @@ def strong(solver: MultistartSolver, found: Sequence[Solved], ranges: np.ndarray
         for k, solved in enumerate(found):
             if solved.status == CONVERGED and solved.multipliers is not None:
                 weights, tolerance = solved.multipliers.of_objectives, solver.solves.tolerance
-                found[k] = strongly_optimal(solver.from_vector, tolerance, solved, weights, ranges)
+                found[k] = strongly_optimal(solver.from_vector, solver.nlp, tolerance, solved, weights, ranges)
                 solver.solves.counts.keep(found[k] is not solved)
     return found
 
@@ -202,7 +205,7 @@ def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], fo
             others = solver.from_draws(tasks[k : k + TOGETHER], found[k : k + TOGETHER])
         for i, other in enumerate(others, k):
             alpha, known = tasks[i].optimum(other), tasks[i].optimum(found[i])
-            if alpha is not None and (known is None or alpha < known - MULTISTART.clearly):
+            if alpha is not None and (known is None or alpha < known - CLEARLY):
                 found[i], replaced = other, True
                 solver.solves.counts.keep(1)
     return replaced

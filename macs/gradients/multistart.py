@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -23,8 +23,7 @@ import numpy as np
 
 from transcription.base import INFEASIBLE, NLP
 from transcription.meshes.errors import objective_variations
-from transcription.nlp.derivatives import convex_objectives, linear_objectives, objective_gradients
-from transcription.nlp.program import nlp_scales
+from transcription.nlp.derivatives import convex_objectives, objective_gradients
 from transcription.nlp.scalarized import Solved
 from transcription.smooth import Smooth
 from transcription.stopping import Stopped, stopping
@@ -33,7 +32,7 @@ from ..evaluation.evaluator import CONVERGED
 from ..io.interrupts import spending
 from ..io.workers import TOGETHER
 from ..pareto.archive import Archive
-from .scalarised import WORK, GradientSolves, Scalarised
+from .scalarised import CLEARLY, WORK, GradientSolves, Scalarised, at_bounds
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,6 @@ class MultistartLimits:
     """Tolerances between results, and the rules by which starts are enough."""
 
     excess: float = 1e-8  # part of an objective's range by which its limit may be exceeded
-    clearly: float = 1e-7  # difference in alpha by which a result is clearly better: the accuracy of solves
     iterations: int = 200  # most of each further start
     held: int = 50  # most iterations of a solve for given times: one that takes more has no feasible point, or is not convex
     infeasible: tuple[int, int] = (8, 16)  # fewest and most starts without a feasible vector; between them, what took `WORK.little`
@@ -256,8 +254,9 @@ class MultistartSolver:
 
     def _held(self, start: np.ndarray, task: Scalarised, times: Sequence[np.ndarray]) -> list[Solved]:
         """The results of solves from a vector (n,) for given times (k,) each."""
+        task = replace(task, held=self.nlp.times)
         with self.solves.at_most(MULTISTART.held):
-            return self.solves.each(self.nlp, [(self._with(self.nlp.times, start, given), task) for given in times], held=self.nlp.times)
+            return self.solves.each(self.nlp, [(self._with(self.nlp.times, start, given), task) for given in times])
 
     def _added(self, solved: Solved) -> Solved:
         """A result, which is known from now on if it converged."""
@@ -377,7 +376,7 @@ class MultistartSolver:
                 converged = stopping_rule.converged
                 if converged and not stopping_rule.accuracy:
                     variations = objective_variations(self.nlp, best.z)[task.moving] / task.weights[task.moving]
-                    stopping_rule.accuracy = MULTISTART.clearly * float(variations.max())
+                    stopping_rule.accuracy = CLEARLY * float(variations.max())
                 # Where none has converged yet, they may all take long.
                 with self.solves.at_most(MULTISTART.iterations if converged else self.solves.max_iterations):
                     if sides:
@@ -487,7 +486,7 @@ class MultistartSolver:
             return None
         merits = self.merits(task, self._known.F, self._known.violation, strict=True)
         own = self.merits(task, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
-        return self._known.Z[np.argmin(merits)] if merits.min() < own - MULTISTART.clearly else None
+        return self._known.Z[np.argmin(merits)] if merits.min() < own - CLEARLY else None
 
     def from_rivals(self, found: Sequence[Solved], tasks: Sequence[Scalarised]) -> list[Solved]:
         """The better of each result and a solve from a better known vector; if that moves far away, also of one that stays near it."""
@@ -505,15 +504,10 @@ class MultistartSolver:
 
 
 def is_least(nlp: NLP, z: np.ndarray, task: Scalarised) -> bool:
-    """Whether a vector (n,) attains the least value of a linear objective, the only one of the problem, over the bounds of the variables.
-    No other start can then improve it by more than the accuracy of solves."""
+    """Whether a vector (n,) attains the least value of a linear objective, the only one of the problem, over the bounds of the variables:
+    no other start can improve it then."""
     (used,) = np.nonzero(task.used)
-    if len(used) != 1:
-        return False
-    slopes = np.array(objective_gradients(nlp)(z)).reshape(-1, len(z))[used[0]]
-    room = np.where(nlp.period > 0, np.inf, np.where(slopes > 0, z - nlp.lower, nlp.upper - z))
-    to_fall = float(np.abs(slopes[slopes != 0.0]) @ room[slopes != 0.0])
-    return to_fall <= MULTISTART.clearly * nlp_scales(nlp)[used[0]] and bool(linear_objectives(nlp)[used[0]])
+    return len(used) == 1 and at_bounds(nlp, z, int(used[0])) is not None
 
 
 def guessed_start(nlp: NLP) -> np.ndarray | None:

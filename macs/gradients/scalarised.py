@@ -11,13 +11,18 @@ import numpy as np
 
 from transcription.base import NLP
 from transcription.inner.base import solves_charge
+from transcription.nlp.derivatives import linear_objectives, objective_gradients
 from transcription.nlp.elastic import least_violation
 from transcription.nlp.optimality import Multipliers
+from transcription.nlp.program import nlp_scales
 from transcription.nlp.scalarized import Solved, not_begun, scalarize
 from transcription.stopping import stopping
 
 from ..evaluation.evaluator import CONVERGED, FAILED, Counts
 from ..io.workers import each
+
+CLEARLY = 1e-7
+"""Difference in alpha by which a result is clearly better: the accuracy of solves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +39,7 @@ class Scalarised:
     ceiling: np.ndarray | None = None  # (m,)
     units: np.ndarray = field(default_factory=lambda: np.ones(1))  # (m,): what counts as one in each objective; default: 1
     summed: bool = False
+    held: Sequence[int] | np.ndarray = ()  # variables that keep the values at which a solve begins
 
     @classmethod
     def single(cls, i: int, m: int, ceiling: np.ndarray | None = None) -> Scalarised:
@@ -43,7 +49,8 @@ class Scalarised:
     @property
     def stated(self) -> dict[str, Any]:
         """It as arguments of `scalarize`."""
-        return {"reference": self.reference, "weights": self.weights, "ceiling": self.ceiling, "summed": self.summed}
+        names = ("reference", "weights", "ceiling", "summed", "held")
+        return {name: getattr(self, name) for name in names}
 
     @property
     def used(self) -> np.ndarray:
@@ -108,12 +115,40 @@ class EndLimits:
 END = EndLimits()
 
 
+def at_bounds(nlp: NLP, z: np.ndarray, i: int) -> dict[int, float] | None:
+    """The variables of objective i with their values at its least, {index: value}, if it is linear and a vector (n,) attains the least that
+    bounds allow; else None. Nothing improves it by more than the accuracy of solves."""
+    slopes = np.array(objective_gradients(nlp)(z)).reshape(-1, len(z))[i]
+    (own,) = np.nonzero(slopes)
+    least = np.where(nlp.period > 0, np.inf, np.where(slopes > 0, nlp.lower, nlp.upper))[own]
+    attained = float(np.abs(slopes[own]) @ np.abs(z[own] - least)) <= CLEARLY * nlp_scales(nlp)[i] and linear_objectives(nlp)[i]
+    return dict(zip(own.tolist(), least.tolist(), strict=True)) if attained else None
+
+
+def held_at_bounds(nlp: NLP, z: np.ndarray, task: Scalarised) -> tuple[Scalarised, Callable[[np.ndarray], np.ndarray]]:
+    """A task without ceilings at the least that bounds allow, which a vector (n,) attains: nothing is strictly inside of such a ceiling, so
+    the variables of these objectives are held at their bounds instead; and what moves starts (n,) there."""
+    assert task.ceiling is not None
+    held, ceiling = dict[int, float](), task.ceiling.copy()
+    for i in np.flatnonzero(task.ceiling < np.inf).tolist():
+        if (found := at_bounds(nlp, z, i)) is not None:
+            held, ceiling[i] = held | found, np.inf
+
+    def moved(start: np.ndarray) -> np.ndarray:
+        other = start.copy()
+        other[[*held]] = [*held.values()]
+        return other
+
+    return replace(task, ceiling=ceiling, held=[*held]), moved
+
+
 WEAK = "it may be improved in other objectives without a loss in its own: no solve for these converged"
 """Message of an end."""
 
 
 def without_loss(
     solve: Callable[[np.ndarray, Scalarised, bool], Solved],
+    nlp: NLP,
     tolerance: float,
     end: Solved,
     task: Scalarised,
@@ -124,13 +159,16 @@ def without_loss(
 
     Often the end alone attains it: nothing is strictly inside then, and a solve takes long without improving anything. So there is `slack`
     (m,) first. If multipliers explain the gain, the end stays. Otherwise a solve without slack follows; however that ends, it counts if it
-    is feasible and lacks little but what the slack is worth. If it does not, what the slack loses counts as nothing.
+    is feasible and lacks little but what the slack is worth. If it does not, what the slack loses counts as nothing. Where the ceiling is
+    the least that bounds allow, there is none of this: see `held_at_bounds`.
     """
+    task, moved = held_at_bounds(nlp, end.z, task)
     assert task.ceiling is not None
     limited, freer = task.ceiling < np.inf, replace(task, ceiling=task.ceiling + slack)
-    best = solve(end.z, freer, True)
-    if best.status != CONVERGED:
-        best = solve(end.z, freer, False)
+    tight = bool(limited.any())
+    best = solve(moved(end.z), freer, tight)
+    if tight and best.status != CONVERGED:
+        best = solve(moved(end.z), freer, False)
     if best.status != CONVERGED:
         return replace(end, message=WEAK)
     explained = float(np.max(slack[task.moving] / task.weights[task.moving]))
@@ -142,7 +180,9 @@ def without_loss(
     gain = task.alpha(end.F) - task.alpha(best.F)
     if gain <= explained:
         return end
-    best = min([best, *(solve(other, freer, False) for other in others)], key=task.rank)
+    best = min([best, *(solve(moved(other), freer, False) for other in others)], key=task.rank)
+    if not tight:
+        return best
     exact = solve(best.z, task, True)
     if exact.status != CONVERGED and exact.violation <= END.close and task.alpha(exact.F) < task.alpha(end.F) - 0.1 * gain:
         exact = solve(exact.z, task, True)  # much was gained before the iterations ran out
@@ -155,7 +195,12 @@ def without_loss(
 
 
 def strongly_optimal(
-    solve: Callable[[np.ndarray, Scalarised, bool], Solved], tolerance: float, point: Solved, weights: np.ndarray, ranges: np.ndarray
+    solve: Callable[[np.ndarray, Scalarised, bool], Solved],
+    nlp: NLP,
+    tolerance: float,
+    point: Solved,
+    weights: np.ndarray,
+    ranges: np.ndarray,
 ) -> Solved:
     """A point, or a better one: a point that is optimal with a positive weight (m,) on every objective is Pareto optimal; of another, the
     objectives without weight are minimised once, the others kept. ranges (m,)."""
@@ -164,7 +209,7 @@ def strongly_optimal(
     if not left.any() or left.all():
         return point
     task = Scalarised(np.where(left, point.F, np.inf), ranges, np.where(left, np.inf, point.F))
-    found = without_loss(solve, tolerance, point, task, END.slack * ranges)
+    found = without_loss(solve, nlp, tolerance, point, task, END.slack * ranges)
     return found if found.message != WEAK else point
 
 
@@ -195,10 +240,14 @@ class LexicographicEnd(Scalarised):
         """See `Scalarised.solve`."""
         mine, units = self.moving, self.weights
         alone = Scalarised(self.reference, units)
+        assert self.known is not None
+        if len(units) > 1 and at_bounds(nlp, start, int(np.argmax(mine))) is not None:
+            found = self._others(solves, nlp, start, self.known, start, near)
+            if found.status == CONVERGED:
+                return replace(found, multipliers=None)  # at its bound, the one objective is at its least
         first = solves(nlp, start, alone, near)
         if len(units) == 1:
             return first
-        assert self.known is not None
         ceiling = np.where(mine, np.inf, self.known + END.room * units)
         if not stopping() and (first.status != CONVERGED or (ceiling < first.F).any()):
             held = solves(nlp, start, replace(alone, ceiling=ceiling), near)
@@ -207,14 +256,19 @@ class LexicographicEnd(Scalarised):
         if first.status != CONVERGED:
             return first
         # No slack: where the front is steep, a small loss in one objective changes another by its square root.
-        others = Scalarised(np.where(mine, np.inf, first.F), units, np.where(mine, first.F, np.inf))
         # The first solve does not look at the other objectives, and often leaves a start that was nearly the end.
         (F,), (violation,) = nlp.evaluate(start[None])
         closer = violation <= END.close and bool((first.F >= F).all())
-        with solves.at_most(END.ties):
-            second = solves(nlp, start if closer else first.z, others, near)
+        second = self._others(solves, nlp, first.z, first.F, start if closer else first.z, near)
         # What tells whether the one objective is at its least are the multipliers for that alone.
         return replace(second, multipliers=first.multipliers) if second.status == CONVERGED else first
+
+    def _others(self, solves: GradientSolves, nlp: NLP, z: np.ndarray, F: np.ndarray, start: np.ndarray, near: bool) -> Solved:
+        """The least values of the others, measured from F (m,), where a vector (n,) has the least of the one."""
+        mine = self.moving
+        task, moved = held_at_bounds(nlp, z, Scalarised(np.where(mine, np.inf, F), self.weights, np.where(mine, F, np.inf)))
+        with solves.at_most(END.ties):
+            return solves(nlp, moved(start), task, near)
 
 
 MOST_ITERATIONS = 500
@@ -260,18 +314,16 @@ class GradientSolves:
         nlp: NLP,
         begun: Sequence[tuple[np.ndarray, Scalarised]],
         near: bool = False,
-        held: Sequence[int] | np.ndarray = (),
         warm: Multipliers | None = None,
     ) -> list[Solved]:
-        """The results of independent solves, each from a vector (n,), side by side where there are processes (`io.workers`); some variables
-        are `held`."""
+        """The results of independent solves, each from a vector (n,), side by side where there are processes (`io.workers`)."""
         self.before()
         if self._most_work <= self.counts.work:
             return [replace(not_begun(nlp, start), status=FAILED, clocked=False) for start, _ in begun]
         iterations = max(1, int(min(self.max_iterations, (self._most_work - self.counts.work) / len(nlp.variables))))
         persistent = self._persistent and iterations == self.max_iterations
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": iterations, "persistent": persistent}
-        settings = {"near": near, "held": held, "warm": warm, **limits}
+        settings = {"near": near, "warm": warm, **limits}
         pieces = [(one, task.stated | settings) for one, task in begun]
         return [self._counted(nlp, solved) for solved in each(scalarized, nlp, pieces)]
 
@@ -284,6 +336,11 @@ class GradientSolves:
         charge = solves_charge(nlp, int(solved.begun), solved.iterations)
         self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables), charge)
         return solved
+
+    @property
+    def left(self) -> float:
+        """The work that is left, see `within`."""
+        return self._most_work - self.counts.work
 
     @contextmanager
     def within(self, work: float) -> Iterator[None]:

@@ -241,7 +241,7 @@ class _Mending:
             begun = {i: near[i][k] for i, one in enumerate(found) if isinstance(one, str) and near[i][k] in meshed}
             starts = [(from_dict(points[row].transcription or {}), points[row].decision) for row in begun.values()]
             pieces = [(*start, Scalarised(targets[i], scales, units=scales)) for i, start in zip(begun, starts, strict=True)]
-            solved = self._loop.each(lambda loop, method, z, task: task.solve(loop.solves, loop.programs(method), z), pieces)
+            solved = self._loop.each(_solved, pieces)
             new = dict[int, Points]()
             for (i, row), (method, _), one in zip(begun.items(), starts, solved, strict=True):
                 found[i] = "did not converge"
@@ -269,7 +269,7 @@ class _Mending:
             nlp = self.programs(from_dict(points[i].transcription or {}))
             point = Solved(points[i].decision, points[i].F, points[i].violation, CONVERGED, 0)
             with self._solves.at_most(MENDING.patience):
-                found = strongly_optimal(partial(self._solves, nlp), self._solves.tolerance, point, weights, scales)
+                found = strongly_optimal(partial(self._solves, nlp), nlp, self._solves.tolerance, point, weights, scales)
             if found is not point:
                 certificate = certified(nlp, found.z[None], scales)
                 new = self.marked(from_vectors(nlp, found.z[None], points.solver, points.stats, **certificate, **_judged(points[[i]])))
@@ -332,6 +332,12 @@ class _Mending:
         spent = points.stats.get("work", 0) + self._solves.counts.work - self._work + WORK.building * self.programs.built
         size = float(np.mean([len(variables) for variables in points.places])) if fine is None else len(self.programs(fine).variables)
         return max(share * self._work - spent, MENDING.each * count * size, MENDING.least)
+
+
+def _solved(loop: MeshLoop, method: Meshed, z: np.ndarray, task: Scalarised) -> Solved:
+    """The result of a solve from the vector (n,) of a point nearby."""
+    with loop.solves.at_most(MENDING.patience):
+        return task.solve(loop.solves, loop.programs(method), z)
 
 
 def _enough(scales: np.ndarray, limits: float, point: OnMesh) -> bool:

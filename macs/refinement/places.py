@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -146,7 +147,7 @@ def _solved(
         return found, {}, solves.counts
     if found.multipliers is not None:
         weights = found.multipliers.of_objectives
-        found = strongly_optimal(lambda z, other, near: other.solve(solves, nlp, z, near), tolerance, found, weights, task.units)
+        found = strongly_optimal(partial(solves, nlp), nlp, tolerance, found, weights, task.units)
     return found, {name: column[0] for name, column in certified(nlp, found.z[None], task.units).items()}, solves.counts
 
 

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs import optimize, payoff
+from macs.gradients import ends, scalarised
 from macs.gradients.ends import ENDS, lexicographic_ends, moved_along, proper_ends
 from macs.gradients.multistart import MultistartSolver
 from macs.gradients.scalarised import WEAK, GradientSolves, LexicographicEnd, Scalarised, without_loss
@@ -103,7 +104,7 @@ def test_what_a_slack_gains_at_a_vertical_end_is_not_taken_for_a_tie(power):
     near = solver.from_vector(one.z, replace(task, ceiling=task.ceiling + slack), near=True)
     assert near.F[1] == pytest.approx(-(1e-5 ** (1 / power)), rel=0.01)
     before = solver.solves.counts.gradient_solves
-    end = without_loss(solver.from_vector, 1e-6, one, task, slack, [other.z])
+    end = without_loss(solver.from_vector, solver.nlp, 1e-6, one, task, slack, [other.z])
     assert end.F[0] <= one.F[0] + 1e-8 and abs(end.z[place]) < 1e-2
     assert power == 4 or (end is one and solver.solves.counts.gradient_solves == before + 1)
 
@@ -113,12 +114,53 @@ def test_an_end_that_cannot_be_improved_with_slack_either_says_so():
     (first, _), (second, _) = optimum_from(solver, 0, 0.9 * POOR), optimum_from(solver, 1, GOOD)
     task = Scalarised.single(1, 2, np.array([first.F[0], np.inf]))
     failing = replace(second, status="failed")
-    assert without_loss(lambda z, task, near: failing, 1e-6, first, task, np.full(2, 1e-5)).message == WEAK
+    assert without_loss(lambda z, task, near: failing, solver.nlp, 1e-6, first, task, np.full(2, 1e-5)).message == WEAK
 
     def only_with_slack(z, asked, near):
         return second if asked.ceiling[0] > task.ceiling[0] else failing
 
-    assert without_loss(only_with_slack, 1e-6, first, task, np.full(2, 1e-5)) is second
+    assert without_loss(only_with_slack, solver.nlp, 1e-6, first, task, np.full(2, 1e-5)) is second
+
+
+def solver_of_a_bound() -> tuple[MultistartSolver, Solved, list[Scalarised]]:
+    """Its end at a bound is reached by many controls, of which a constant one takes least; such a control; and the tasks solved since."""
+    problem = Problem("bound")
+    run = problem.phase("run", t0=0.0, tf=1.0)
+    x, u = run.state("x", bounds=(-2, 0.5), initial=0), run.control("u", bounds=(-1, 1))
+    run.dynamics(x=u)
+    problem.maximize("end", run.final(x))
+    problem.minimize("effort", run.integral(u**2))
+    problem.minimize("miss", (run.initial(u) - 1.0) ** 2)
+    solver = MultistartSolver(DFET(2, 2).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
+    tilted = solver.nlp.first_guess(np.linspace(1, 0, len(solver.nlp.free))[None])[0]
+    first, tasks, each = solver.from_vector(tilted, Scalarised.single(0, 3)), list[Scalarised](), solver.solves.each
+    solver.solves.each = lambda nlp, begun, *more, **named: tasks.extend(task for _, task in begun) or each(nlp, begun, *more, **named)
+    return solver, first, tasks
+
+
+def test_an_objective_at_its_bound_is_held_there_and_not_limited():
+    solver, first, tasks = solver_of_a_bound()
+    one, two = (Scalarised.single(k, 3, np.where(np.arange(3) < k, first.F, np.inf)) for k in (1, 2))
+    end = without_loss(solver.from_vector, solver.nlp, 1e-6, first, one, np.full(3, 1e-5), [solver.nlp.lower])
+    assert first.F[1] > 0.26 and end.F[:2] == pytest.approx([-0.5, 0.25], abs=1e-6)
+    assert len(tasks) == 2 and all(np.isinf(task.ceiling).all() and len(task.held) == 1 for task in tasks)
+    assert without_loss(solver.from_vector, solver.nlp, 1e-6, end, one, np.full(3, 1e-5)) is end, "where nothing is gained"
+    beside, moved = scalarised.held_at_bounds(solver.nlp, end.z, two)
+    assert beside.ceiling.tolist() == [np.inf, first.F[1], np.inf] and moved(solver.nlp.lower)[beside.held] == 0.5
+
+
+def test_on_another_mesh_an_end_at_its_bound_takes_one_solve():
+    solver, first, tasks = solver_of_a_bound()
+    found = LexicographicEnd.of(0, np.ones(3), first.F).solve(solver.solves, solver.nlp, first.z)
+    assert found.F[0] == pytest.approx(-0.5, abs=1e-7) and found.F[1] < first.F[1] and len(tasks) == 1 and found.multipliers is None
+
+
+def test_no_end_takes_the_work_of_the_others(monkeypatch):
+    solver, left = solver_of_two_valleys(), list[float]()
+    optima = [optimum_from(solver, i, GOOD)[0] for i in (0, 1)]
+    monkeypatch.setattr(ends, "_from_each_other", lambda *known: None)
+    monkeypatch.setattr(ends, "_lexicographic", lambda solver, i, known: left.append(solver.solves.left) or known[i])
+    assert lexicographic_ends(solver, optima.__getitem__, 100.0) == optima and left == [50.0, 100.0]
 
 
 @pytest.mark.slow
@@ -218,7 +260,8 @@ MOVES: list[Answer] = [("converged", (1.5, 90.0)), ("converged", (2.0, 5.2)), ("
         pytest.param([("failed", (2.0, 5.0)), ("infeasible", (2.0, 5.2))], FAR, 0, [-1, -1], [np.inf, 5.5], id="nothing converges"),
     ],
 )
-def test_which_result_is_the_end(answers, mesh, taken, starts, ceiling):
+def test_which_result_is_the_end(answers, mesh, taken, starts, ceiling, monkeypatch):
+    monkeypatch.setattr(scalarised, "at_bounds", lambda nlp, z, i: None)
     solves = Solves(answers)
     found = LexicographicEnd.of(0, UNITS, KNOWN).solve(solves, mesh, np.array([-1.0]))  # type: ignore[arg-type]
     assert (found.status, tuple(found.F.tolist())) == answers[taken]
