@@ -18,7 +18,7 @@ from ..io.workers import TOGETHER
 from ..pareto.directions import divisions_below, simplex_lattice
 from ..pareto.dominance import ranges
 from .multistart import MULTISTART, MultistartSolver
-from .scalarised import CLEARLY, END, WEAK, WORK, Scalarised, strongly_optimal, without_loss
+from .scalarised import END, WEAK, WORK, Scalarised, strongly_optimal, without_loss
 
 METHODS = ("pascoletti-serafini", "epsilon")
 """Scalarisations of a sweep."""
@@ -58,8 +58,7 @@ def lexicographic_ends(solver: MultistartSolver, single: Callable[[int], Solved]
             _from_each_other(solver, optima, tried)
             for i in range(m):
                 if optima[i] is not ends[i]:
-                    # None takes what is meant for the others.
-                    with solver.solves.within(solver.solves.left / (m - i)):
+                    with solver.solves.within(most / (m + 1)):  # and as much for what is sought from each other
                         ends[i] = end = _lexicographic(solver, i, optima)
                     solver.solves.counts.keep(end is not optima[i] and end.message != WEAK)
             if all(one is end for one, end in zip(optima, ends, strict=True)):
@@ -205,7 +204,7 @@ def _from_other_starts(solver: MultistartSolver, tasks: Sequence[Scalarised], fo
             others = solver.from_draws(tasks[k : k + TOGETHER], found[k : k + TOGETHER])
         for i, other in enumerate(others, k):
             alpha, known = tasks[i].optimum(other), tasks[i].optimum(found[i])
-            if alpha is not None and (known is None or alpha < known - CLEARLY):
+            if alpha is not None and (known is None or alpha < known - END.clearly):
                 found[i], replaced = other, True
                 solver.solves.counts.keep(1)
     return replaced

@@ -32,7 +32,7 @@ from ..evaluation.evaluator import CONVERGED
 from ..io.interrupts import spending
 from ..io.workers import TOGETHER
 from ..pareto.archive import Archive
-from .scalarised import CLEARLY, WORK, GradientSolves, Scalarised, at_bounds
+from .scalarised import END, WORK, GradientSolves, Scalarised, at_bounds
 
 
 @dataclass(frozen=True)
@@ -254,9 +254,9 @@ class MultistartSolver:
 
     def _held(self, start: np.ndarray, task: Scalarised, times: Sequence[np.ndarray]) -> list[Solved]:
         """The results of solves from a vector (n,) for given times (k,) each."""
-        task = replace(task, held=self.nlp.times)
+        tasks = [replace(task, held=dict(zip(self.nlp.times.tolist(), given, strict=True))) for given in times]
         with self.solves.at_most(MULTISTART.held):
-            return self.solves.each(self.nlp, [(self._with(self.nlp.times, start, given), task) for given in times])
+            return self.solves.each(self.nlp, [(start, one) for one in tasks])
 
     def _added(self, solved: Solved) -> Solved:
         """A result, which is known from now on if it converged."""
@@ -376,7 +376,7 @@ class MultistartSolver:
                 converged = stopping_rule.converged
                 if converged and not stopping_rule.accuracy:
                     variations = objective_variations(self.nlp, best.z)[task.moving] / task.weights[task.moving]
-                    stopping_rule.accuracy = CLEARLY * float(variations.max())
+                    stopping_rule.accuracy = END.clearly * float(variations.max())
                 # Where none has converged yet, they may all take long.
                 with self.solves.at_most(MULTISTART.iterations if converged else self.solves.max_iterations):
                     if sides:
@@ -486,7 +486,7 @@ class MultistartSolver:
             return None
         merits = self.merits(task, self._known.F, self._known.violation, strict=True)
         own = self.merits(task, solved.F[None], np.array([solved.violation]))[0] if solved.status == CONVERGED else np.inf
-        return self._known.Z[np.argmin(merits)] if merits.min() < own - CLEARLY else None
+        return self._known.Z[np.argmin(merits)] if merits.min() < own - END.clearly else None
 
     def from_rivals(self, found: Sequence[Solved], tasks: Sequence[Scalarised]) -> list[Solved]:
         """The better of each result and a solve from a better known vector; if that moves far away, also of one that stays near it."""

@@ -21,9 +21,6 @@ from transcription.stopping import stopping
 from ..evaluation.evaluator import CONVERGED, FAILED, Counts
 from ..io.workers import each
 
-CLEARLY = 1e-7
-"""Difference in alpha by which a result is clearly better: the accuracy of solves."""
-
 
 @dataclass(frozen=True, eq=False)
 class Scalarised:
@@ -39,7 +36,7 @@ class Scalarised:
     ceiling: np.ndarray | None = None  # (m,)
     units: np.ndarray = field(default_factory=lambda: np.ones(1))  # (m,): what counts as one in each objective; default: 1
     summed: bool = False
-    held: Sequence[int] | np.ndarray = ()  # variables that keep the values at which a solve begins
+    held: Mapping[int, float] = field(default_factory=dict)  # variables and the values that these keep
 
     @classmethod
     def single(cls, i: int, m: int, ceiling: np.ndarray | None = None) -> Scalarised:
@@ -49,8 +46,12 @@ class Scalarised:
     @property
     def stated(self) -> dict[str, Any]:
         """It as arguments of `scalarize`."""
-        names = ("reference", "weights", "ceiling", "summed", "held")
-        return {name: getattr(self, name) for name in names}
+        limits = {"ceiling": self.ceiling, "summed": self.summed, "held": [*self.held]}
+        return {"reference": self.reference, "weights": self.weights, **limits}
+
+    def begun(self, start: np.ndarray) -> np.ndarray:
+        """A start (n,) with the variables that are held."""
+        return np.array([self.held.get(k, value) for k, value in enumerate(start.tolist())])
 
     @property
     def used(self) -> np.ndarray:
@@ -104,6 +105,7 @@ class EndLimits:
     """Limits of the solves for an end of a front on another mesh."""
 
     room: float = 0.05  # how much worse other objectives may become, in units, before the end is also sought near where it was
+    clearly: float = 1e-7  # difference in alpha by which a result is clearly better: the accuracy of solves
     tied: float = 1e-6  # what counts as no loss of its own objective then, in units
     close: float = 1e-3  # violation up to which a start on another mesh is nearly the end itself, and a solve may go on
     ties: int = 150  # most iterations of a solve that is to improve the others
@@ -121,39 +123,29 @@ def at_bounds(nlp: NLP, z: np.ndarray, i: int) -> dict[int, float] | None:
     slopes = np.array(objective_gradients(nlp)(z)).reshape(-1, len(z))[i]
     (own,) = np.nonzero(slopes)
     least = np.where(nlp.period > 0, np.inf, np.where(slopes > 0, nlp.lower, nlp.upper))[own]
-    attained = float(np.abs(slopes[own]) @ np.abs(z[own] - least)) <= CLEARLY * nlp_scales(nlp)[i] and linear_objectives(nlp)[i]
+    attained = float(np.abs(slopes[own]) @ np.abs(z[own] - least)) <= END.clearly * nlp_scales(nlp)[i] and linear_objectives(nlp)[i]
     return dict(zip(own.tolist(), least.tolist(), strict=True)) if attained else None
 
 
-def held_at_bounds(nlp: NLP, z: np.ndarray, task: Scalarised) -> tuple[Scalarised, Callable[[np.ndarray], np.ndarray]]:
-    """A task without ceilings at the least that bounds allow, which a vector (n,) attains: nothing is strictly inside of such a ceiling, so
-    the variables of these objectives are held at their bounds instead; and what moves starts (n,) there."""
+def held_at_bounds(nlp: NLP, z: np.ndarray, task: Scalarised) -> Scalarised:
+    """A task without the ceilings that are the least that bounds allow, which a vector (n,) attains: nothing is strictly inside of them, so
+    the variables of their objectives are held instead."""
     assert task.ceiling is not None
-    held, ceiling = dict[int, float](), task.ceiling.copy()
-    for i in np.flatnonzero(task.ceiling < np.inf).tolist():
-        if (found := at_bounds(nlp, z, i)) is not None:
-            held, ceiling[i] = held | found, np.inf
-
-    def moved(start: np.ndarray) -> np.ndarray:
-        other = start.copy()
-        other[[*held]] = [*held.values()]
-        return other
-
-    return replace(task, ceiling=ceiling, held=[*held]), moved
+    found = {i: held for i in np.flatnonzero(task.ceiling < np.inf).tolist() if (held := at_bounds(nlp, z, i)) is not None}
+    ceiling = np.where(np.isin(np.arange(len(task.ceiling)), [*found]), np.inf, task.ceiling)
+    return replace(task, ceiling=ceiling, held={k: value for held in found.values() for k, value in held.items()})
 
 
 WEAK = "it may be improved in other objectives without a loss in its own: no solve for these converged"
 """Message of an end."""
 
 
+Solve = Callable[[np.ndarray, Scalarised, bool], Solved]
+"""The result of a solve from a vector (n,), or near it only."""
+
+
 def without_loss(
-    solve: Callable[[np.ndarray, Scalarised, bool], Solved],
-    nlp: NLP,
-    tolerance: float,
-    end: Solved,
-    task: Scalarised,
-    slack: np.ndarray,
-    others: Sequence[np.ndarray] = (),
+    solve: Solve, nlp: NLP, tolerance: float, end: Solved, task: Scalarised, slack: np.ndarray, others: Sequence[np.ndarray] = ()
 ) -> Solved:
     """The least value of a task under a ceiling (m,) that an end attains; also from other vectors (n,), which may lie in better valleys.
 
@@ -162,13 +154,12 @@ def without_loss(
     is feasible and lacks little but what the slack is worth. If it does not, what the slack loses counts as nothing. Where the ceiling is
     the least that bounds allow, there is none of this: see `held_at_bounds`.
     """
-    task, moved = held_at_bounds(nlp, end.z, task)
+    task = held_at_bounds(nlp, end.z, task)
     assert task.ceiling is not None
     limited, freer = task.ceiling < np.inf, replace(task, ceiling=task.ceiling + slack)
-    tight = bool(limited.any())
-    best = solve(moved(end.z), freer, tight)
-    if tight and best.status != CONVERGED:
-        best = solve(moved(end.z), freer, False)
+    best = solve(end.z, freer, bool(limited.any()))
+    if limited.any() and best.status != CONVERGED:
+        best = solve(end.z, freer, False)
     if best.status != CONVERGED:
         return replace(end, message=WEAK)
     explained = float(np.max(slack[task.moving] / task.weights[task.moving]))
@@ -180,8 +171,8 @@ def without_loss(
     gain = task.alpha(end.F) - task.alpha(best.F)
     if gain <= explained:
         return end
-    best = min([best, *(solve(moved(other), freer, False) for other in others)], key=task.rank)
-    if not tight:
+    best = min([best, *(solve(other, freer, False) for other in others)], key=task.rank)
+    if not limited.any():
         return best
     exact = solve(best.z, task, True)
     if exact.status != CONVERGED and exact.violation <= END.close and task.alpha(exact.F) < task.alpha(end.F) - 0.1 * gain:
@@ -194,14 +185,7 @@ def without_loss(
     return exact if task.alpha(exact.F) < task.alpha(end.F) else end
 
 
-def strongly_optimal(
-    solve: Callable[[np.ndarray, Scalarised, bool], Solved],
-    nlp: NLP,
-    tolerance: float,
-    point: Solved,
-    weights: np.ndarray,
-    ranges: np.ndarray,
-) -> Solved:
+def strongly_optimal(solve: Solve, nlp: NLP, tolerance: float, point: Solved, weights: np.ndarray, ranges: np.ndarray) -> Solved:
     """A point, or a better one: a point that is optimal with a positive weight (m,) on every objective is Pareto optimal; of another, the
     objectives without weight are minimised once, the others kept. ranges (m,)."""
     sizes = weights * ranges
@@ -266,9 +250,9 @@ class LexicographicEnd(Scalarised):
     def _others(self, solves: GradientSolves, nlp: NLP, z: np.ndarray, F: np.ndarray, start: np.ndarray, near: bool) -> Solved:
         """The least values of the others, measured from F (m,), where a vector (n,) has the least of the one."""
         mine = self.moving
-        task, moved = held_at_bounds(nlp, z, Scalarised(np.where(mine, np.inf, F), self.weights, np.where(mine, F, np.inf)))
+        task = held_at_bounds(nlp, z, Scalarised(np.where(mine, np.inf, F), self.weights, np.where(mine, F, np.inf)))
         with solves.at_most(END.ties):
-            return solves(nlp, moved(start), task, near)
+            return solves(nlp, start, task, near)
 
 
 MOST_ITERATIONS = 500
@@ -324,7 +308,7 @@ class GradientSolves:
         persistent = self._persistent and iterations == self.max_iterations
         limits: dict[str, Any] = {"tolerance": self.tolerance, "max_iterations": iterations, "persistent": persistent}
         settings = {"near": near, "warm": warm, **limits}
-        pieces = [(one, task.stated | settings) for one, task in begun]
+        pieces = [(task.begun(one), task.stated | settings) for one, task in begun]
         return [self._counted(nlp, solved) for solved in each(scalarized, nlp, pieces)]
 
     def least_violation(self, nlp: NLP, start: np.ndarray) -> Solved:
@@ -337,15 +321,10 @@ class GradientSolves:
         self.counts.add_solves(int(solved.begun), [solved.status], solved.iterations, solved.clocked, len(nlp.variables), charge)
         return solved
 
-    @property
-    def left(self) -> float:
-        """The work that is left, see `within`."""
-        return self._most_work - self.counts.work
-
     @contextmanager
     def within(self, work: float) -> Iterator[None]:
         """Context in which solves end when together they have taken so much work."""
-        usual, self._most_work = self._most_work, self.counts.work + work
+        usual, self._most_work = self._most_work, min(self._most_work, self.counts.work + work)
         try:
             yield
         finally:

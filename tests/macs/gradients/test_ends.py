@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from macs import optimize, payoff
-from macs.gradients import ends, scalarised
+from macs.gradients import scalarised
 from macs.gradients.ends import ENDS, lexicographic_ends, moved_along, proper_ends
 from macs.gradients.multistart import MultistartSolver
 from macs.gradients.scalarised import WEAK, GradientSolves, LexicographicEnd, Scalarised, without_loss
@@ -122,45 +122,32 @@ def test_an_end_that_cannot_be_improved_with_slack_either_says_so():
     assert without_loss(only_with_slack, solver.nlp, 1e-6, first, task, np.full(2, 1e-5)) is second
 
 
-def solver_of_a_bound() -> tuple[MultistartSolver, Solved, list[Scalarised]]:
-    """Its end at a bound is reached by many controls, of which a constant one takes least; such a control; and the tasks solved since."""
+def test_an_objective_at_its_bound_is_held_there_and_not_limited():
+    """Many controls reach the end at its bound; a constant one takes the least effort."""
     problem = Problem("bound")
     run = problem.phase("run", t0=0.0, tf=1.0)
     x, u = run.state("x", bounds=(-2, 0.5), initial=0), run.control("u", bounds=(-1, 1))
     run.dynamics(x=u)
     problem.maximize("end", run.final(x))
     problem.minimize("effort", run.integral(u**2))
-    problem.minimize("miss", (run.initial(u) - 1.0) ** 2)
-    solver = MultistartSolver(DFET(2, 2).nlp(problem), None, 1, np.random.default_rng(0), GradientSolves(1e-6))
-    tilted = solver.nlp.first_guess(np.linspace(1, 0, len(solver.nlp.free))[None])[0]
-    first, tasks, each = solver.from_vector(tilted, Scalarised.single(0, 3)), list[Scalarised](), solver.solves.each
-    solver.solves.each = lambda nlp, begun, *more, **named: tasks.extend(task for _, task in begun) or each(nlp, begun, *more, **named)
-    return solver, first, tasks
-
-
-def test_an_objective_at_its_bound_is_held_there_and_not_limited():
-    solver, first, tasks = solver_of_a_bound()
-    one, two = (Scalarised.single(k, 3, np.where(np.arange(3) < k, first.F, np.inf)) for k in (1, 2))
-    end = without_loss(solver.from_vector, solver.nlp, 1e-6, first, one, np.full(3, 1e-5), [solver.nlp.lower])
-    assert first.F[1] > 0.26 and end.F[:2] == pytest.approx([-0.5, 0.25], abs=1e-6)
-    assert len(tasks) == 2 and all(np.isinf(task.ceiling).all() and len(task.held) == 1 for task in tasks)
-    assert without_loss(solver.from_vector, solver.nlp, 1e-6, end, one, np.full(3, 1e-5)) is end, "where nothing is gained"
-    beside, moved = scalarised.held_at_bounds(solver.nlp, end.z, two)
-    assert beside.ceiling.tolist() == [np.inf, first.F[1], np.inf] and moved(solver.nlp.lower)[beside.held] == 0.5
-
-
-def test_on_another_mesh_an_end_at_its_bound_takes_one_solve():
-    solver, first, tasks = solver_of_a_bound()
-    found = LexicographicEnd.of(0, np.ones(3), first.F).solve(solver.solves, solver.nlp, first.z)
-    assert found.F[0] == pytest.approx(-0.5, abs=1e-7) and found.F[1] < first.F[1] and len(tasks) == 1 and found.multipliers is None
+    nlp, solves = DFET(2, 2).nlp(problem), GradientSolves(1e-6)
+    tilted = nlp.first_guess(np.linspace(1, 0, len(nlp.free))[None])[0]
+    first, tasks = solves(nlp, tilted, Scalarised.single(0, 2)), list[Scalarised]()
+    task, slack = Scalarised.single(1, 2, np.array([first.F[0], np.inf])), np.full(2, 1e-5)
+    end = without_loss(lambda z, one, near: tasks.append(one) or solves(nlp, z, one), nlp, 1e-6, first, task, slack, [nlp.lower])
+    assert first.F[1] > 0.26 and np.abs(end.F - [-0.5, 0.25]).max() < 1e-6
+    assert [(one.ceiling.min(), [*one.held.values()]) for one in tasks] == [(np.inf, [0.5])] * 2
+    assert without_loss(lambda z, one, near: solves(nlp, z, one), nlp, 1e-6, end, task, slack) is end, "nothing is gained"
+    again = LexicographicEnd.of(0, np.ones(2), first.F).solve(solves, nlp, first.z)
+    assert np.abs(again.F - end.F).max() < 1e-6 and solves.counts.gradient_solves == 5, "on another mesh by one"
 
 
 def test_no_end_takes_the_work_of_the_others(monkeypatch):
-    solver, left = solver_of_two_valleys(), list[float]()
-    optima = [optimum_from(solver, i, GOOD)[0] for i in (0, 1)]
-    monkeypatch.setattr(ends, "_from_each_other", lambda *known: None)
-    monkeypatch.setattr(ends, "_lexicographic", lambda solver, i, known: left.append(solver.solves.left) or known[i])
-    assert lexicographic_ends(solver, optima.__getitem__, 100.0) == optima and left == [50.0, 100.0]
+    solver, given = solver_of_two_valleys(), list[float]()
+    with solver.solves.within(5.0), solver.solves.within(9.0):
+        assert solver.solves._most_work == 5.0
+    monkeypatch.setattr(solver.solves, "within", lambda work: given.append(work) or nullcontext())
+    assert len(lexicographic_ends(solver, most=3e6)) == 2 and given[:3] == [3e6, 1e6, 1e6]
 
 
 @pytest.mark.slow
