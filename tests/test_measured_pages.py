@@ -34,7 +34,7 @@ def test_every_page_has_a_header_and_a_command_that_exists(page):
 def test_every_benchmark_is_of_files():
     for files in (one.sources for one in BENCHES.values()):
         assert len(files) > 1 and all(file.is_file() for file in files) and len(set(files)) == len(files)
-    assert any(file.name == "functions.py" for file in BENCHES["uf"].sources) and BENCHES["study"].sources[0].name == "study.py"
+    assert any(file.name == "functions.py" for file in BENCHES["uf"].sources) and BENCHES["study"].sources[0].name == "workers.py"
     assert "macs.search.macs" in BENCHES["uf"].code and "macs.gradient_tools" in BENCHES["peers"].code
 
 

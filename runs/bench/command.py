@@ -14,7 +14,6 @@ from macs.io.interrupts import Stopped
 from ..report.page import PageHeader, digest
 from .contest import CONTESTS
 from .contract import Bench, Row, save
-from .corpus import CORPUS, earlier
 from .curve import CURVE
 from .growth import GENERATION, SCALE
 from .inner import INNER, POPULATION
@@ -22,11 +21,12 @@ from .parts import PARTS_BENCH
 from .peers import PEERS
 from .published import METHODS, STANDARD, WILD
 from .searches import FRONT, SEARCH
-from .study import STUDY
-from .workers import WORKERS
+from .work import CHARGES, CORPUS, earlier
+from .workers import STUDY, WORKERS
 
 BENCHES: dict[str, Bench] = {
     **CONTESTS,
+    "charges": CHARGES,
     "corpus": CORPUS,
     "curve": CURVE,
     "front": FRONT,

@@ -40,6 +40,7 @@ BENCH = """\
 Ratios against the alternatives, measured side by side in one run, with their spread: absolute times depend on the machine.
 
 cf          CF of CEC 2009, as maf, with constraints: MACS against the other algorithms, hypervolume and IGD+
+charges     what runs are charged beside what they take of a processor, searches and gradient solves on all transcriptions
 constrained MW1-14 and DTLZ with constraints: MACS against the other algorithms at equal evaluations, hypervolume
 corpus      gradient solves, iterations and CPU time for one optimum of every problem, with defaults
 curve       fronts as curves: points and solves for an error, how many targets solved anew lie within it, and a finer mesh

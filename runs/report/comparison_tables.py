@@ -88,7 +88,7 @@ def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, T
         notes.append(
             f"{CHARGED.capitalize()}: all work of a run, gradient solves included, divided by what an evaluation of {charge.solver} takes, "
             "which takes least of the solvers without gradient solves. Each kind of work has a price from counts and sizes, in time of a "
-            "processor, which tests/charges.py measures."
+            "processor, which `macs bench charges` measures."
         )
     return {"spent": table(heads, rows, f"{comparison.name}: costs of a run.", notes)}
 

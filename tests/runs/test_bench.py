@@ -16,7 +16,7 @@ from macs.io.console import Steps
 from macs.io.interrupts import Stopped
 from problems import Problem
 from problems.cases.standard import published
-from runs.bench import BENCHES, corpus, curve, growth, header_of, inner, peers, searches, study, workers
+from runs.bench import BENCHES, curve, growth, header_of, inner, peers, searches, work, workers
 from runs.bench import published as optima
 from runs.bench.contest import CONTESTS
 from runs.bench.contract import Bench, Effort, Row, Target, merge, short, side_by_side, verdicts
@@ -135,7 +135,7 @@ def test_an_interrupt_ends_the_steps():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (["studies"], ["studies", "study", "cf, constrained, corpus, curve, front, generation, inner, maf, many"]),
+        (["studies"], ["studies", "study", "cf, charges, constrained, corpus, curve, front, generation, inner, maf, many"]),
         (["iner"], ["'iner'", "did you mean inner?"]),
         (["inner", "--csv", "nowhere/a.csv"], ["nowhere/a.csv", "there is no folder"]),
         (["inner", "--seeds", "2"], ["'inner' has none"]),
@@ -183,7 +183,7 @@ def inner_rows(speed: float, moved: float, converged: float) -> list[Row]:
 
 def study_rows(speed: float, beyond: float) -> list[Row]:
     one, two = {"speed": [1.0], "beyond": times(beyond)}, {"speed": times(speed), "beyond": [0.5], "work": [1.0], "seconds": [1.0]}
-    return [Row("goddard", study.ONE, one), Row("goddard", study.TWO, two), Row(study.LIMIT, study.TWO, {"speed": [2.0]})]
+    return [Row("goddard", workers.ONE, one), Row("goddard", workers.TWO, two), Row(workers.LIMIT, workers.TWO, {"speed": [2.0]})]
 
 
 def peer_rows(ratio: float, converged: int) -> list[Row]:
@@ -246,7 +246,7 @@ MET_AND_MISSED = [
 def test_targets_follow_the_medians():
     for kind, rows, missed in MET_AND_MISSED:
         assert sum(not one.met for one in BENCHES[kind].targets(rows)) == missed, (kind, rows)
-    assert set(BENCHES) - {kind for kind, *_ in MET_AND_MISSED} == {"corpus", "parts", *CONTESTS}
+    assert set(BENCHES) - {kind for kind, *_ in MET_AND_MISSED} == {"charges", "corpus", "parts", *CONTESTS}
 
 
 @pytest.mark.slow
@@ -357,20 +357,20 @@ def test_the_corpus_stands_beside_an_earlier_run(monkeypatch, tmp_path, capsys):
     def told(kind, address, effort, steps):
         if address == "welded_beam":  # without trajectories
             return [], ""
-        right = 1.420312599049 if work["right"] else 1.5
-        status = "converged" if "theirs" not in address or work["right"] else "failed"
-        numbers = {"ours": right, "simulated": right, "verified": 1.0, "starts": 2, "iterations": work["iterations"], "cpu": work["cpu"]}
+        right = 1.420312599049 if now["right"] else 1.5
+        status = "converged" if "theirs" not in address or now["right"] else "failed"
+        numbers = {"ours": right, "simulated": right, "verified": 1.0, "starts": 2, "iterations": now["iterations"], "cpu": now["cpu"]}
         return [{"status": status, **numbers}], ""
 
-    monkeypatch.setattr(corpus, "lines_of", told)
+    monkeypatch.setattr(work, "lines_of", told)
     cases = ("standard/moon_landing", "welded_beam")
-    monkeypatch.setitem(BENCHES, "corpus", replace(corpus.CORPUS, full=Effort(cases)))
+    monkeypatch.setitem(BENCHES, "corpus", replace(work.CORPUS, full=Effort(cases)))
     file, others = str(tmp_path / "first.csv"), ["--problems", "here/mine.py:build", "here/theirs.py:build"]
-    work = {"right": True, "iterations": 40, "cpu": 1.0}
+    now = {"right": True, "iterations": 40, "cpu": 1.0}
     assert main(["bench", "corpus", "--csv", file, *others]) == 0
     first = capsys.readouterr().out
     assert "solved: 3 of 3" in first and "iterations: geometric mean 40\n" in first and ", before" not in first and "welded" not in first
-    work = {"right": False, "iterations": 10, "cpu": 1.5}
+    now = {"right": False, "iterations": 10, "cpu": 1.5}
     assert main(["bench", "corpus", "--against", file, *others]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "solved: 1 of 3" in lines and "iterations: geometric mean 10, 0.250 times those before" in lines
@@ -465,3 +465,14 @@ def test_parts_are_off_one_at_a_time():
     gains = {row.who: row.values["gain"] for row in rows}
     assert gains["signs of residuals"] == [0.0, 0.0], "none of its limits is on an absolute value"
     assert any(gain != [0.0, 0.0] for gain in gains.values())
+
+
+def test_charges_beside_the_processor(monkeypatch):
+    monkeypatch.setattr(work.time, "process_time", iter(range(100)).__next__)
+    (row,) = measured("charges", "goddard shooting:20 search", rounds=2)
+    assert row.values["processor"] == [1, 1] and row.values["ratio"] == row.values["nominal"]
+    rows = [Row("a", kind, {"ratio": times(ratio)}) for kind, ratio in (("search", 1.0), ("search", 1.6), ("sweep", 0.7), ("sweep", 1.4))]
+    words = (
+        "Of 4 (search, sweep), 3 are within a factor of 1.5 of the processor, 2 of each other, and the greatest ratio between two is 2.29"
+    )
+    assert f"{words}, of a search to a sweep. " in (text := " ".join(work.agreement(rows))) and "Outside: a search 1.60." in text

@@ -43,7 +43,7 @@ PRICES = {"compiled": 0.35, "costly": 10.0, "interpreted": 2.6, "root": 12}
 PRICES |= {"batch": 500_000, "candidate": 40_000, "number": 60, "steps": 250_000, "step": 50_000}
 # A gradient solve, an iteration of IPOPT, an entry of its matrix, an instruction of its derivatives.
 PRICES |= {"solve": 15_000_000, "iteration": 400_000, "entry": 100, "derivative": 10}
-"""Nanoseconds of one processor for each kind of work, fitted to its times (`tests/charges.py`), which make different work comparable."""
+"""Nanoseconds of one processor for each kind of work, fitted to its times (`macs bench charges`), which make different work comparable."""
 CHAIN = "chain"
 """Name of a Function of so many repetitions that it, and all that it is a part of, is not to be written out."""
 
