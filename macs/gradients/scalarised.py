@@ -158,8 +158,8 @@ def without_loss(
     assert task.ceiling is not None
     limited, freer = task.ceiling < np.inf, replace(task, ceiling=task.ceiling + slack)
     best = solve(end.z, freer, bool(limited.any()))
-    if limited.any() and best.status != CONVERGED:
-        best = solve(end.z, freer, False)
+    if best.status != CONVERGED:  # where nothing is limited, it may be on its way to another valley
+        best = solve(end.z if limited.any() else best.z, freer, False)
     if best.status != CONVERGED:
         return replace(end, message=WEAK)
     explained = float(np.max(slack[task.moving] / task.weights[task.moving]))

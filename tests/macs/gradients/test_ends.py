@@ -123,21 +123,21 @@ def test_an_end_that_cannot_be_improved_with_slack_either_says_so():
 
 
 def test_an_objective_at_its_bound_is_held_there_and_not_limited():
-    """Many controls reach the end at its bound; a constant one takes the least effort."""
-    problem = Problem("bound")
-    run = problem.phase("run", t0=0.0, tf=1.0)
+    run = (problem := Problem("bound")).phase("run", t0=0.0, tf=1.0)
     x, u = run.state("x", bounds=(-2, 0.5), initial=0), run.control("u", bounds=(-1, 1))
     run.dynamics(x=u)
     problem.maximize("end", run.final(x))
     problem.minimize("effort", run.integral(u**2))
     nlp, solves = DFET(2, 2).nlp(problem), GradientSolves(1e-6)
-    tilted = nlp.first_guess(np.linspace(1, 0, len(nlp.free))[None])[0]
-    first, tasks = solves(nlp, tilted, Scalarised.single(0, 2)), list[Scalarised]()
+    first, tasks = solves(nlp, nlp.first_guess(np.linspace(1, 0, len(nlp.free))[None])[0], Scalarised.single(0, 2)), list[Scalarised]()
     task, slack = Scalarised.single(1, 2, np.array([first.F[0], np.inf])), np.full(2, 1e-5)
     end = without_loss(lambda z, one, near: tasks.append(one) or solves(nlp, z, one), nlp, 1e-6, first, task, slack, [nlp.lower])
     assert first.F[1] > 0.26 and np.abs(end.F - [-0.5, 0.25]).max() < 1e-6
     assert [(one.ceiling.min(), [*one.held.values()]) for one in tasks] == [(np.inf, [0.5])] * 2
     assert without_loss(lambda z, one, near: solves(nlp, z, one), nlp, 1e-6, end, task, slack) is end, "nothing is gained"
+    begun, short = list[float](), replace(end, z=nlp.upper, status="failed")
+    without_loss(lambda z, one, near: begun.append(z[0]) or short, nlp, 1e-6, end, task, slack)
+    assert begun == [end.z[0], nlp.upper[0]], "what ran out of iterations goes on"
     again = LexicographicEnd.of(0, np.ones(2), first.F).solve(solves, nlp, first.z)
     assert np.abs(again.F - end.F).max() < 1e-6 and solves.counts.gradient_solves == 5, "on another mesh by one"
 
