@@ -41,11 +41,13 @@ def curve_rounds(given: SearchCase | str, effort: Effort, steps: Steps) -> Calla
         curve, seconds = front.curve(), time.perf_counter() - began
         known, places = KnownPoints(front), np.random.default_rng(number).random(effort.evaluations or 100)
         lines = [curve.least + curve.ranges * [place, 1.0 - place] for place in places[~np.isnan(curve.at(places)[0])]]
+        steps(f"curve: {case.name}, {len(lines)} targets anew")
         anew = [one for one in known.solved(*(Scalarised(line, curve.ranges, units=known.units) for line in lines)) if one.row is None]
         away = curve.distances(np.array([one.F for one in anew]) * front.signs)
         F, costates = np.array([*front.F, *(one.F for one in anew)]), [*front.costates, *(one.columns["costates"] for one in anew)]
         good = [k for k in np.flatnonzero(alone(F, curve.ranges)) if costates[k] is not None]
         exact = FrontCurve.through(front.goals, F[good], np.array([costates[k].weights for k in good]), [])
+        steps(f"curve: {case.name}, on a finer mesh")
         other = exact.distances(finished(swept(finer(mesh, problem), points=5, start=front)).objectives).max()
         counts = {"points": len(front), "solves": front.stats["gradient_solves"], "ends": front.stats["solves_for"]["ends"]}
         counts |= {"targets": len(anew), "lines": even_points(exact, error)}
