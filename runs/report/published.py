@@ -23,7 +23,7 @@ from ..measures.indicators import Scale, hypervolume_at, normalised
 from ..measures.statistics import summarise
 from .choices import RunChoice, chosen
 from .comparison import Comparison, Counting, samples, spent
-from .tables import Cell, Head, Table, table
+from .tables import Cell, Head, PrintedNumber, Table, table
 
 if TYPE_CHECKING:
     from macs.front import Front
@@ -537,7 +537,8 @@ def _beside(comparisons: Sequence[Comparison], paper: PublishedTable, study: Map
     notes: list[str] = []
     for problem in dict.fromkeys(row["problem"] for row in paper.rows):
         here = [comparison for comparison in comparisons if comparison.problem == problem]
-        theirs = [row for row in paper.rows if row["problem"] == problem]
+        rows_here = [row for row in paper.rows if row["problem"] == problem]
+        theirs = [{key: PrintedNumber(value) if isinstance(value, float) else value for key, value in row.items()} for row in rows_here]
         if not here:
             continue
         took = max((row["seconds"] for row in theirs if "seconds" in row), default=None)

@@ -131,8 +131,14 @@ class Table:
         return shown
 
 
+class PrintedNumber(float):
+    """A number that a paper prints: it is shown with the digits that it has there."""
+
+
 def short(value: float, digits: int = 3) -> str:
     """A number with significant digits; large whole numbers, usually counts, in full; NaN is a dash."""
+    if isinstance(value, PrintedNumber):
+        return f"{value:.9g}"
     if np.isnan(value):
         return "-"
     if np.isinf(value):

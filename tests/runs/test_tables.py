@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from runs.measures.statistics import overall, pairwise, summarise
 from runs.report.comparison_tables import overall_table, pairs_table, summary_table
-from runs.report.tables import ESCAPES, Head, escaped, latex_number, short, table
+from runs.report.tables import ESCAPES, Head, PrintedNumber, escaped, latex_number, short, table
 
 EXAMPLE = table(
     [Head("case", grouped=True), "solver", Head("GD", "1", digits=2), "runs"],
@@ -65,6 +65,7 @@ def test_the_same_numbers_as_text_csv_latex_markdown_and_in_files(tmp_path):
         (-3e12, "-3.00e+12", r"$-3.00 \times 10^{12}$"),
         (np.nan, "-", "--"),
         (-np.inf, "-inf", r"$-\infty$"),
+        (PrintedNumber(2773.92), "2773.92", "$2773.92$"),
     ],
 )
 def test_numbers(value, text, latex):
