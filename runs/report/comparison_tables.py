@@ -59,7 +59,7 @@ def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[s
     found: dict[str, Table] = {}
     reference = comparison.against
     for name, against in {"indicators": reference, "indicators-union": comparison.union()}.items():
-        if not len(against.front) or (name != "indicators" and not reference.true):
+        if not len(against.front) or (name != "indicators" and (against.alone or not reference.true)):
             continue
         measured = samples(comparison, against)
         scale = Scale.of(against.front, what=against.what).describe()

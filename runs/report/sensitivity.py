@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from problems.compiled import CompiledProblem, Objective
     from problems.vector import CompiledVectorProblem
 
-SIMULATED_POINTS, DISPERSED_POINTS = 60, 100
+SIMULATED_POINTS, DISPERSED_POINTS = 60, 12
 """Number of points of a front that are simulated under changed data, and flown under dispersions: each point takes many flights."""
 LOOKS: Mapping[str, Mapping[str, Any]] = {
     "nominal front": {"marker": "o", "ms": 3.0, "mew": 0, "color": "black", "zorder": 3},
