@@ -20,4 +20,4 @@ front.plot_trajectories([0, 3, 5])
 # the initial speed. All of it is burned at full thrust after the lowest point, where the dynamic pressure is at its limit on all
 # three flights; the load factor touches its limit on the way there, and the heating rate stays far below. Point #5 takes another
 # way down than the others: many descents lead to the same pass at the lowest point, and a solve keeps the one it comes upon. All
-# points are verified. Six points took 18 gradient solves.
+# points are verified. Six points took 14 gradient solves.
