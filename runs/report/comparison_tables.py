@@ -9,6 +9,7 @@ import numpy as np
 
 from ..measures.indicators import Scale
 from ..measures.statistics import ALPHA, PairTest, overall, pairwise, summarise
+from .choices import only_single_points
 from .comparison import CHARGED, Charge, Comparison, samples, spent
 from .tables import Cell, Head, Table, table
 
@@ -98,7 +99,7 @@ def runs_table(found: Sequence[Comparison]) -> Table:
     rows: list[list[Cell]] = []
     for comparison in found:
         known = comparison.against
-        measured = samples(comparison, known) if len(known.front) and not known.alone else {}
+        measured = samples(comparison, known) if len(known.front) and not known.alone and not only_single_points(comparison) else {}
         for solver, runs in comparison.runs.items():
             for i, run in enumerate(runs):
                 stats, cpu, points = run.front.stats, run.history.get("cpu") or [None], len(comparison.fronts[solver][i])
