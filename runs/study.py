@@ -16,7 +16,7 @@ from problems.compiled import Objective
 from transcription import Smooth
 
 from .batch import file as studyfile
-from .batch.cells import INNER, Cell, Modules, check_inner, combine, sampling, written
+from .batch.cells import AUTO, INNER, Cell, Modules, check_inner, combine, sampling, written
 from .batch.code import Code, code_of_method
 from .batch.store import Store, StoredRun, StudySummary
 from .execution.task import Payload, RunTask
@@ -55,8 +55,8 @@ class Study:
         One or several names, such as "macs", or solvers; or {label: one of them}, or {label: {"solver": name, settings...}}.
     terms : mapping, optional
         {label of a solver: terms of its own}: any of transcription (one, its label among `transcriptions`, or {label of a problem: one}),
-        evaluations, inner and start. Reports compare it with the others on each of their transcriptions; if all solvers have their own,
-        with each other.
+        evaluations, inner, start and runs: at most so many, one for a solver that draws nothing. Reports compare it with the others on
+        each of their transcriptions; if all solvers have their own, with each other.
     evaluations : int, "auto", or mapping, optional
         Budget of each run, or {label of a problem: budget}; "auto": searches of MACS end when they are done. Default: the problem's own.
     runs : int
@@ -152,7 +152,7 @@ class Study:
 
     def _repr_html_(self) -> str:
         """For notebooks: a row for each cell."""
-        rows = [[*cell.labels, "auto" if cell.evaluations is None else f"{cell.evaluations}", str(self.runs)] for cell in self.cells]
+        rows = [[*cell.labels, f"{cell.evaluations or AUTO}", str(cell.runs(self.runs))] for cell in self.cells]
         heads = ["problem", "transcription", "solver", "evaluations of a run", "runs"]
         table = html_table([heads], rows, [True, True, True, False, False])
         return html_block(f"study {self.name}", table, [self.description] if self.description else [])

@@ -27,7 +27,7 @@ from transcription import Smooth, Transcription, stated, word
 from transcription.inner import NAMED
 
 from ..execution.task import Addressed, Payload
-from ..files import Section, check_known, checked, errors_begin_with, plain
+from ..files import Count, Section, check_known, checked, errors_begin_with, plain
 
 Statement = Problem | CompiledProblem | VectorProblem | CompiledVectorProblem
 Modules = tuple[str, str, str]
@@ -65,6 +65,10 @@ class Cell:
     def terms(self) -> Mapping[str, Any]:
         """The terms of its runs that differ from the study's: those of its solver, and of its problem where the study states none."""
         return self.details.get("terms", {})
+
+    def runs(self, asked: int) -> int:
+        """How many it has where so many are asked for."""
+        return min(asked, self.terms.get("runs", asked))
 
     @property
     def apart(self) -> bool:
@@ -114,15 +118,15 @@ class SolverTerms(Section):
     evaluations: Any = None
     inner: Any = None
     start: Any = None
+    runs: Count | None = None
 
 
 def check_terms(terms: Any, solvers: Collection[str]) -> None:
     """Raise ValueError that names what is wrong in a study's `terms`, of solvers with these labels."""
     if not isinstance(terms, Mapping):
         raise ValueError(f"terms must be a table of tables, one for a solver, not {terms!r}")
+    check_known("solver in terms", terms, solvers)
     for label, own in terms.items():
-        if label not in solvers:
-            raise ValueError(f"terms: there is no solver '{label}'; there are {', '.join(solvers)}")
         with errors_begin_with(f"terms of '{label}'"):
             checked(own, SolverTerms)
             if not own:
@@ -376,9 +380,7 @@ def _by_problem(key: str, given: Any, problems: Mapping[str, Statement], own: Ca
         return found
     if not isinstance(given, Mapping):
         return dict.fromkeys(problems, given)
-    for label in given:
-        if label not in problems:
-            raise ValueError(f"{key}: there is no problem '{label}'; there are {', '.join(problems)}")
+    check_known(f"problem in {key}", given, problems)
     for label in problems:
         if label not in given:
             raise ValueError(f"{key}: none for problem '{label}'")

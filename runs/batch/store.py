@@ -270,7 +270,7 @@ class Store:
     def runs(self, count: int | None = None) -> Iterator[StoredRun]:
         """All runs there are to be, cell by cell: finished, failed, unreadable and missing ones. By default as many as were asked for."""
         for cell in self.cells:
-            for number in range(1, (self.definition["runs"] if count is None else count) + 1):
+            for number in range(1, cell.runs(self.definition["runs"] if count is None else count) + 1):
                 yield self.run(cell, number)
 
     def front_path(self, cell: Cell, number: int) -> Path:

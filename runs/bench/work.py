@@ -131,11 +131,9 @@ def agreement(rows: Sequence[Row], agree: float = 1.5) -> list[str]:
         words += f"Of {len(own)} ({', '.join(kinds)}), {near} are within a factor of {agree:g} of the processor, {most} of each other, and "
         words += f"the greatest ratio between two is {own[-1][0] / least:.2f}, of {own[-1][1]} to {low}. "
     words += "Outside: " + (", ".join(f"{who} {ratio:.2f}" for ratio, who in every if not 1 / agree <= ratio <= agree) or "none")
-    return fill(f"{words}. {WHY}", 140, break_on_hyphens=False).splitlines()
+    return fill(f"{words}.", 140, break_on_hyphens=False).splitlines()
 
 
-WHY = """Without a price: derivatives and solver of a program, certificates, simulations; most of a run of few solves, or on several meshes.
-Rows of constraints take less in a search than their price; equations within a propagation have one price, whatever steps they need."""
 CHARGES = Bench(
     title="charges",
     about="CHARGES: seconds that runs are charged, by counts and prices, over those of a processor; median [least, greatest] of rounds, "
