@@ -285,7 +285,7 @@ WRONG = (
     ({"problems": "godard"}, "did you mean 'goddard'"),
     ({"problems": {"a": 7}}, "'a' must be a name"),
     ({"transcriptions": "dfat:4x6"}, "unknown transcription 'dfat:4x6'"),
-    ({"transcriptions": {"glide": "dfet:2x2", "other": "dfet:2x2"}}, "no problem 'other'"),
+    ({"transcriptions": {"glide": "dfet:2x2", "other": "dfet:2x2"}}, "unknown problem in transcriptions 'other'"),
     ({"transcriptions": 3}, "must be a word such as dfet:4x6"),
     ({"inner": "autos"}, "unknown inner level 'autos', did you mean auto?"),
     ({"tolerance": 0}, "tolerance must be a positive number"),
