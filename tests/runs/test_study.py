@@ -276,7 +276,7 @@ WRONG = (
     ({"runs": True}, "runs"),
     ({"seed": -1}, "seed"),
     ({"evaluations": 0}, "evaluations must be a whole number"),
-    ({"evaluations": {"glider": 10}}, "no problem 'glider'"),
+    ({"evaluations": {"glider": 10}}, "unknown problem in evaluations 'glider'"),
     ({"solvers": "mac"}, "did you mean macs"),
     ({"solvers": {"a": {"solver": "macs", "agent": 10}}}, "setting of solver 'macs' 'agent', did you mean agents"),
     ({"solvers": {"a": {"solver": "macs", "agents": 1}}}, "agents must be"),
