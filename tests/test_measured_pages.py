@@ -193,7 +193,7 @@ def test_terms_of_table_vii_are_those_that_its_study_of_parametrisations_found_t
     stated = set()
     for label, one in stating["terms"].items():
         solver, start = label.removesuffix(", uniform").removesuffix(", equal time"), one.get("start", stating["start"])
-        if not label.endswith(", as printed"):
+        if not label.endswith(", as printed") and not label.startswith("sweep"):  # gradients alone have meshes of their own
             assert one["transcription"] == best[solver, start][1], label
             assert stating["solvers"][label] == choosing["solvers"][solver]
             stated.add((solver, start))

@@ -66,10 +66,12 @@ def indicator_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[s
         scale = Scale.of(against.front, what=against.what).describe()
         title = f"{comparison.name}: against {against.what}"
         found[name] = summary_table(measured, caption=f"{title}.", notes=[scale])
-        if against is reference and len(measured["GD"]) > 1 < max(map(len, measured["GD"].values())):  # of one run each nothing follows
-            found["comparisons"] = pairs_table(measured, caption=f"{title}: solvers in pairs.")
-            if len(measured["GD"]) > 2:
-                found["overall"] = overall_table(measured, caption=f"{title}: all solvers.")
+        # From one run of a solver nothing follows.
+        several = {key: {solver: values for solver, values in own.items() if len(values) > 1} for key, own in measured.items()}
+        if against is reference and len(several["GD"]) > 1:
+            found["comparisons"] = pairs_table(several, caption=f"{title}: solvers in pairs.")
+            if len(several["GD"]) > 2:
+                found["overall"] = overall_table(several, caption=f"{title}: all solvers.")
     return found
 
 
@@ -123,8 +125,6 @@ def medians_table(runs: Table) -> Table:
 
 Samples = Mapping[str, Mapping[str, Sequence[float] | np.ndarray]]
 """Indicator -> solver -> one value for each run; NaN or infinite where a run failed."""
-
-
 LARGER = frozenset({"hypervolume"})
 """Indicators of which larger values are better."""
 
