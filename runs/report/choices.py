@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,14 +55,11 @@ def chosen(comparison: Comparison) -> list[RunChoice]:
     for solver, runs in comparison.runs.items():
         for run in runs:
             stats = run.front.stats
-            if "choices" not in stats:
-                continue
-            ranges = Ranges(**stats["ranges"])
-            for point, about in zip(run.front, stats["choices"], strict=True):
+            for point, about in zip(run.front, stats["choices"], strict=True) if "choices" in stats else ():
                 values = point.simulated if point.verified and point.simulated is not None else point.objectives
                 name = about["label"] if len(runs) == 1 else f"{about['label']} (run {run.number})"
                 made = from_dict(about["preference"])
-                J = np.array(list(values.values()))
+                J, ranges = np.array(list(values.values())), Ranges(**stats["ranges"])
                 found.append(RunChoice(solver, name, point, J, made, ranges, about["steps"], about["message"]))
     return found
 
@@ -109,9 +107,10 @@ def choices_figures(comparison: Comparison) -> dict[str, Figure]:
     for solver in dict.fromkeys(one.solver for one in every):
         mine = [one for one in every if one.solver == solver]
         found |= {f"lambda-{solver}-{k}": figure for k, figure in enumerate(lambda_figures(mine), 1)}
-        for number, part in enumerate((mine[k : k + SIDE_BY_SIDE] for k in range(0, len(mine), SIDE_BY_SIDE)), 1):
-            stem = solver if len(mine) <= SIDE_BY_SIDE else f"{solver}-{number}"
-            found[f"degrees-{stem}"] = degrees_figure(part)
+        size = ceil(len(mine) / ceil(len(mine) / SIDE_BY_SIDE))
+        for number, part in enumerate((mine[k : k + size] for k in range(0, len(mine), size)), 1):
+            stem = solver if len(mine) == size else f"{solver}-{number}"
+            found[f"degrees-{stem}"] = degrees_figure(part, mine[0])
             if all(one.point.trajectory is not None for one in part):
                 points = [one.point for one in part]
                 found[f"flights-{stem}"] = flights_figure(points, names=[one.label for one in part])
@@ -142,12 +141,12 @@ def lambda_figures(every: Sequence[RunChoice]) -> list[Figure]:
     return found
 
 
-def degrees_figure(every: Sequence[RunChoice]) -> Figure:
-    """Degrees of some choices as bars beside each other, by the preference of the first."""
-    by, goals = every[0].preference, every[0].point.goals
+def degrees_figure(every: Sequence[RunChoice], first: RunChoice) -> Figure:
+    """Degrees of some choices as bars beside each other, by the preference of the first of all."""
+    by, goals = first.preference, first.point.goals
     with style():
         figure = new_figure(PAGE, 3.0)
-        degrees = {one.label: one.degrees(by, every[0].ranges) for one in every}
+        degrees = {one.label: one.degrees(by, first.ranges) for one in every}
         ax = draw_degrees(degrees, [goal.name for goal in goals], by.DEGREE, by.MARKS, by.SMALLER, ax=figure.subplots())
         if (beside := ax.get_legend()) is not None:
             beside.remove()  # its columns do not know how long names are
