@@ -226,7 +226,7 @@ class Store:
     def claim(cls, out: str | PathLike[str], definition: Mapping[str, Any]) -> Iterator[Store]:
         """The folder of this study, made if it does not exist, and locked within the context.
 
-        Its record has the largest number of runs ever asked for.
+        The study may have more cells than when it was last there. Its record has the largest number of runs ever asked for.
         """
         path = Path(out)
         cls._suits(path, definition)
@@ -244,7 +244,7 @@ class Store:
         """The study in a folder; None if the folder is new. Raises ValueError if it contains something else."""
         if (path / "study.json").exists():
             store = cls.open(path)
-            store.check(definition)
+            store.check(definition, grown=True)
             return store
         if os.path.lexists(path) and not path.is_dir():
             raise ValueError(f"'{path}' is not a folder")
@@ -253,12 +253,12 @@ class Store:
             raise ValueError(f"'{path}' contains no study but other things, '{others[0]}' for one; give a folder of its own")
         return None
 
-    def check(self, definition: Mapping[str, Any]) -> None:
-        """Raise ValueError with the first difference unless this is the same study: what decides its numbers, and its cells."""
+    def check(self, definition: Mapping[str, Any], grown: bool = False) -> None:
+        """Raise ValueError with the first difference unless this is the same study; it may have more cells now if it is `grown`."""
         here, there = ({key: one.get(key) for key in definition["decides"]} for one in (definition, self.definition))
         ours, theirs = ({cell.name: cell.to_dict() for cell in cells} for cells in (checked(definition, Definition).cells, self.cells))
         different = _difference(there, here)
-        for name in (*theirs, *ours):
+        for name in (*theirs, *(() if grown else ours)):
             if not different and (name in ours) != (name in theirs):
                 different = f"cell '{name}' is {'there but not here' if name in theirs else 'here but not there'}"
             different = different or _difference(theirs[name], ours[name], f"{name}: ")

@@ -111,12 +111,12 @@ def test_a_front_without_a_record_counts_if_it_can_be_read_and_a_record_without_
     assert found.status == "unreadable" and found.message.startswith(f"its record '{record}' is damaged")
 
 
-def test_the_same_study_may_come_again_with_more_runs_and_never_has_fewer(tmp_path):
-    for runs, latest in ((3, 3), (1, 3), (3, 3), (4, 4)):
-        with Store.claim(tmp_path, study(runs=runs).definition()) as store:
+def test_the_same_study_may_come_again_with_more_runs_or_solvers_and_never_has_fewer(tmp_path):
+    for runs, latest, cells, more in ((3, 3, 1, {"solvers": {"small": NSGA2(population=4)}}), (1, 3, 2, {}), (3, 3, 2, {}), (4, 4, 2, {})):
+        with Store.claim(tmp_path, study(runs=runs, **more).definition()) as store:
             assert store.definition["runs"] == latest and store.path == tmp_path
         again = Store.open(tmp_path)
-        assert again.definition["runs"] == latest and len(list(again.runs())) == 2 * latest and len(list(again.runs(1))) == 2
+        assert again.definition["runs"] == latest and len(list(again.runs())) == cells * latest and len(list(again.runs(1))) == cells
 
 
 def test_a_folder_that_is_written_is_refused_to_others(store):
