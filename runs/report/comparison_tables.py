@@ -97,8 +97,8 @@ def cost_tables(comparison: Comparison, study: Mapping[str, Any]) -> dict[str, T
 
 
 def runs_table(found: Sequence[Comparison]) -> Table:
-    """A row for each finished run of some comparisons: its costs, the number of its points that count, and its indicators."""
-    rows: list[list[Cell]] = []
+    """A row for each finished run of some comparisons, by the first that it is in: costs, number of points that count, indicators."""
+    rows: dict[Any, list[Cell]] = {}
     for comparison in found:
         known = comparison.against
         measured = samples(comparison, known) if len(known.front) and not known.alone and not only_single_points(comparison) else {}
@@ -107,10 +107,10 @@ def runs_table(found: Sequence[Comparison]) -> Table:
                 stats, cpu, points = run.front.stats, run.history.get("cpu") or [None], len(comparison.fronts[solver][i])
                 costs = [stats["evaluations"], stats["gradient_solves"], cpu[-1], run.wall_time]
                 values = [measured[name][solver][i] if measured else None for name in ("GD", "IGD", "hypervolume")]
-                rows.append([comparison.shown, comparison.transcription, solver, run.number, *costs, points, *values])
+                rows.setdefault(run.path, [comparison.shown, run.cell.transcription, solver, run.number, *costs, points, *values])
     heads: list[Head | str] = [*(Head(name, grouped=True) for name in ("problem", "transcription")), "solver", "run"]
     heads += ["evaluations", "gradient solves", Head("processor", "s"), Head("time", "s"), "points", "GD", "IGD", "hypervolume"]
-    return table(heads, rows)
+    return table(heads, list(rows.values()))
 
 
 def medians_table(runs: Table) -> Table:

@@ -9,6 +9,7 @@ from problems import Problem
 from runs import Study
 from runs.batch.store import Store
 from runs.report.comparison import comparisons
+from runs.report.comparison_tables import runs_table
 from transcription import Smooth, parse
 
 APART = {"macs": {"transcription": "dfet:3x2", "evaluations": 40, "inner": "ipopt", "start": "uniform", "runs": 1}}
@@ -26,8 +27,7 @@ def test_cells():
     assert set(cells) == {("glide", "shooting:5", "nsga2"), ("glide", "shooting:9", "nsga2"), ("glide", "dfet:3x2", "macs")}
     assert cells["glide", "dfet:3x2", "macs"].evaluations == 40 and cells["glide", "shooting:5", "nsga2"].evaluations == 60
     plain = study(terms={}, solvers={"nsga2": SOLVERS["nsga2"]}).cells[0]
-    same = cells[plain.labels]
-    assert same.seed(1, 1) == plain.seed(1, 1) and same.to_dict() == plain.to_dict(), "others do not notice"
+    assert cells[plain.labels].seed(1, 1) == plain.seed(1, 1) and cells[plain.labels].to_dict() == plain.to_dict(), "others do not notice"
     quick = study(terms={"macs": {**APART["macs"], "evaluations": 9000}}, evaluations=60_000).quick()
     assert {cell.labels[2]: cell.evaluations for cell in quick.cells} == {"macs": 75, "nsga2": 500}
     assert quick.terms["macs"]["inner"] == "ipopt" and quick.runs == 2
@@ -39,7 +39,7 @@ def test_cells():
 def test_runs_are_made_on_these_terms_and_compared_on_each_ground(tmp_path):
     assert study().run(tmp_path / "out", executor=Inline()).finished == 5
     found = comparisons(Store.open(tmp_path / "out"), {})
-    assert [comparison.transcription for comparison in found] == ["shooting:5", "shooting:9"]
+    assert [comparison.transcription for comparison in found] == ["shooting:5", "shooting:9"] and len(runs_table(found).rows) == 5
     for comparison in found:
         assert list(comparison.fronts) == ["nsga2", "macs"]
         assert comparison.place("macs") == "dfet:3x2" and comparison.place("nsga2") == comparison.transcription
