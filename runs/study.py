@@ -218,8 +218,7 @@ class Study:
         solvers: Sequence[str] | None = None,
         progress: bool = False,
     ) -> StudySummary:
-        """Make the runs that `out` does not have yet. Each that has begun goes on from a checkpoint of its own. A study that has got more
-        solvers, problems or runs goes on in the same folder.
+        """Make the runs that `out` does not have yet, those of more solvers or problems, too; one that has begun goes on from a checkpoint.
 
         The record of a run has the code that made it, see `batch.code`; a warning says how many are by other code than there is now.
 
