@@ -13,7 +13,9 @@ import pytest
 from runs.bench import BENCHES
 from runs.bench.contract import Row
 from runs.cli import main
-from runs.report.page import PageHeader, digest
+from runs.report.page import PageHeader, digest, digest_of_study
+from runs.report.published import with_count
+from runs.study import Study
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = ROOT / "docs" / "measured" / "make.py"
@@ -104,6 +106,16 @@ def test_every_page_is_listed_with_its_minutes():
     for text in (tomllib.loads(file.read_text())["description"] for file in make.STUDIES.glob("*.toml")):
         assert not re.search(r"\b\d+ runs", text), f"a page says how many runs there are, {text} need not"
     assert sum(minutes for minutes, _ in listed.values()) <= 16 * 60, "eight hours of two processors"
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if not page.stem.startswith("bench-")], ids=lambda page: page.name)
+def test_a_page_has_the_words_of_its_study(page):
+    text, file = page.read_text(encoding="utf-8"), make.STUDIES / f"{page.stem}.toml"
+    if PageHeader.read(text).digest == digest_of_study(file):  # else it is out of date
+        study = Study.load(file)
+        stated = [study.description, study.note, *study.pictures.values()]
+        stated += [one[word] for one in study.paper for word in ("source", "note", "differs") if word in one]
+        assert [words for words in stated if with_count(words, {"runs": study.runs}) not in text] == []
 
 
 def test_the_index_of_papers_leads_somewhere(monkeypatch, tmp_path):

@@ -29,18 +29,19 @@ from .functions import FUNCTIONS, OURS, PlainFunction, solvers
 WORDS = {"igd": "IGD", "igd_plus": "IGD+", "volume": "hypervolume"}
 LARGER = ("volume",)
 """Indicators of which larger values are better."""
+DIGITS = {"volume": 5}
+"""Of an indicator in tables, other than three: volumes of good fronts differ little."""
 OUTCOMES = ("better on", "worse on", "no difference shown on")
 UNJUDGED = "Not judged: what is asked is asked of all functions with all their evaluations, against all rivals."
 ABOUT = (
     "MACS with its defaults against algorithms of pymoo with theirs, at equal evaluations. Populations are as large as the archive of "
-    "MACS; NSGA-III gives all its non-dominated points. Points: how many there are. IGD: mean distance of the true front from the "
-    "points, in the objectives' units for UF (as in the competition), else in ranges of the front; IGD+: an objective counts only "
-    "where a point is worse. Hypervolume: in these ranges, up to 1.1. Distance: of the points from the front, in closed form. Medians "
-    "and quartiles over seeds; rank: of the median among all; to best rival: the median of MACS divided by the best rival's "
-    "(hypervolume: above 1 is better, else below 1); p: two-sided Mann-Whitney test against MACS, from five seeds on, by {by}, "
-    "corrected by Holm over the rivals of each function. NSGA-III, MOEA/D and RVEA have as many directions as points: a simplex "
-    "lattice where one has so many, else evenly spread ones. All seeds are spawned from {seeds[0]}{seeds[1]}.{ranges}"
+    "MACS; NSGA-III gives all its non-dominated points. Points: how many there are. {indicators}Medians and quartiles over seeds; rank: "
+    "of the median among all; to best rival: the median of MACS divided by the best rival's (hypervolume: above 1 is "
+    "better{otherwise}); p: two-sided Mann-Whitney test against MACS, from five seeds on, by {by}, corrected by Holm over the rivals of "
+    "each function. {directed} have as many directions as points: a simplex lattice where one has so many, else evenly spread ones. All "
+    "seeds are spawned from {seeds[0]}{seeds[1]}."
 )
+DIRECTED = ("NSGA-III", "MOEA/D", "RVEA")
 
 Fronts = dict[str, list[Front]]
 """By solver, one for each seed that all solvers have finished."""
@@ -122,10 +123,25 @@ class Contest:
             raise KeyboardInterrupt
 
     def about(self, rows: Sequence[Row]) -> str:
-        """What is measured."""
-        known = any(key.startswith("igd") for row in rows for key in row.values)
-        ranges = "" if known else " Ranges are those of what is non-dominated among all that all found."
-        return f"{self.heading}: {self.more}{ABOUT.format(by=WORDS[self.by], ranges=ranges, seeds=self.seeds)}"
+        """What is measured, by which of the indicators."""
+        keys = {key for row in rows for key in row.values}
+        known = bool(keys & {"igd", "igd_plus"})
+        units = "the objectives' units, as in the competition" if self.name == "uf" else "ranges of the front"
+        ranges = "ranges of the front" if known else "ranges of what is not dominated among all that all found"
+        mean = f"mean distance of the true front from the points, in {units}"
+        told = {
+            "igd": f"IGD: {mean}. ",
+            "igd_plus": f"IGD+: {'the same' if 'igd' in keys else mean}, where an objective counts only if a point is worse in it. ",
+            "volume": f"Hypervolume: in {ranges}, up to 1.1. ",
+            "distance": "Distance: of the points from the front, in closed form. ",
+        }
+        return f"{self.heading}: {self.more}" + ABOUT.format(
+            indicators="".join(text for key, text in told.items() if key in keys),
+            otherwise=", else below 1" if known else "",
+            by=WORDS[self.by],
+            directed=", ".join(who for who in DIRECTED if who in self.rivals),
+            seeds=self.seeds,
+        )
 
     def notes(self, rows: Sequence[Row]) -> list[str]:
         """How ours stands against the best rivals, and whether the set is judged."""
@@ -280,7 +296,7 @@ def against_the_best(rows: Sequence[Row], key: str, p: Mapping[tuple[str, str], 
     lines = [
         f"By {WORDS[key]}, against the best rival of each function (p < {ALPHA:g}): {best}.",
         f"Number of functions better, worse, without difference, against {pairs}.",
-        f"Last of all by the median: {', '.join(last) or 'on none'}.",
+        f"Last by the median, alone or with others: {', '.join(last) or 'on none'}.",
     ]
     return [*(fill(line, 140, break_on_hyphens=False) for line in lines), ""]
 
@@ -309,8 +325,9 @@ def spread(row: Row, key: str) -> str:
     values = row.values.get(key)
     if not values:
         return "-"
-    middle = summarise(values, larger=key in LARGER)
-    return f"{short(middle.median)} [{short(middle.lower)}, {short(middle.upper)}]" if len(values) > 1 else short(middle.median)
+    middle, digits = summarise(values, larger=key in LARGER), DIGITS.get(key, 3)
+    median, lower, upper = (short(value, digits) for value in (middle.median, middle.lower, middle.upper))
+    return f"{median} [{lower}, {upper}]" if len(values) > 1 else median
 
 
 def rank(rows: Sequence[Row], row: Row, key: str) -> str:
@@ -328,7 +345,7 @@ def ratio(rows: Sequence[Row], row: Row, key: str) -> str:
     if row.who != OURS or row.who not in values or len(values) < 2:
         return ""
     rival = best_rival(values, key)[1]
-    return short(values[OURS] / rival) if rival else "-"
+    return short(values[OURS] / rival, DIGITS.get(key, 3)) if rival else "-"
 
 
 PYMOO = ("NSGA-II", "NSGA-III", "MOEA/D", "AGE-MOEA-II")
@@ -337,8 +354,17 @@ untuned = partial(
     Contest,
     by="volume",
     seeds=(58, ", not used before"),
-    more="Nothing in this package was tuned on these functions, and nothing is asked. Without MOEA/D, which takes "
-    "ten times as long as most others. ",
+)
+UNTUNED = (
+    "Nothing in this package was tuned on these functions, which were chosen before their first contest, and no target is set. {chosen} "
+    "Without MOEA/D, which takes ten times as long as most others. "
+)
+MAF = "MaF1 to MaF6: MaF7 is DTLZ7, on which the search was tuned."
+WFG = "WFG: one for each difficulty, bias, a front in pieces, many local optima, variables that are not separable, and deception."
+CF = "CF: of two with the same front (4 and 5, 6 and 7, 9 and 10) the one with more local optima."
+CRE = (
+    "CRE: not the welded beam, which is in the catalogue of problems, nor the one with five objectives, for which SMS-EMOA takes ten "
+    "times as long as all others together."
 )
 ALL_CONTESTS = (
     Contest("many", "MANY OBJECTIVES", (*PYMOO, "RVEA"), ("DTLZ2, 5 objectives",), "volume"),
@@ -353,10 +379,12 @@ ALL_CONTESTS = (
         0.6,
         (2029, ", none of which was used before MACS and what is asked were as they are"),
     ),
-    untuned("maf", "MAF, 5 OBJECTIVES", ("NSGA-II", "NSGA-III", "AGE-MOEA-II", "RVEA"), ("MaF1",)),
-    untuned("wfg", "WFG, 3 OBJECTIVES", ("NSGA-II", "NSGA-III", "SMS-EMOA", "AGE-MOEA-II", "RVEA"), ("WFG4",)),
-    untuned("cf", "CF OF CEC 2009", CONSTRAINED, ("CF1",)),
-    untuned("re", "REAL-WORLD PROBLEMS WITH CONSTRAINTS", CONSTRAINED, ("CRE31",)),
+    untuned("maf", "MAF, 5 OBJECTIVES", ("NSGA-II", "NSGA-III", "AGE-MOEA-II", "RVEA"), ("MaF1",), more=UNTUNED.format(chosen=MAF)),
+    untuned(
+        "wfg", "WFG, 3 OBJECTIVES", ("NSGA-II", "NSGA-III", "SMS-EMOA", "AGE-MOEA-II", "RVEA"), ("WFG4",), more=UNTUNED.format(chosen=WFG)
+    ),
+    untuned("cf", "CF OF CEC 2009", CONSTRAINED, ("CF1",), more=UNTUNED.format(chosen=CF)),
+    untuned("re", "REAL-WORLD PROBLEMS WITH CONSTRAINTS", CONSTRAINED, ("CRE31",), more=UNTUNED.format(chosen=CRE)),
 )
 CONTESTS = {one.name: one.bench for one in ALL_CONTESTS}
 

@@ -1,11 +1,4 @@
-"""Plain functions with known fronts: UF1 to UF10 of CEC 2009, and those of pymoo; the sets of them that solvers are compared on.
-
-Nothing was tuned on MaF, WFG, CF of CEC 2009, and CRE.
-Which functions of a set are taken was fixed before their first contest. MaF: the first six; MaF7 is DTLZ7, which search was tuned on. WFG:
-one for each difficulty, bias, a front in pieces, many local optima, variables that are not separable, and deception. CF: of two that have
-the same front (4 and 5, 6 and 7, 9 and 10), the one with more local optima. CRE: not the welded beam, which the catalogue has, too, nor
-the one with five objectives, for which SMS-EMOA takes ten times as long as all others together.
-"""
+"""Plain functions with known fronts: UF1 to UF10 of CEC 2009, and those of pymoo; the sets of them that solvers are compared on."""
 
 from __future__ import annotations
 

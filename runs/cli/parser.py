@@ -47,7 +47,7 @@ curve       fronts as curves: points and solves for an error, how many targets s
 front       whole fronts by MACS until it is done, by its other inner levels to the same quality, and by sweeps from one and ten starts
 generation  how the time of a generation of NSGA-III grows with individuals, nodes and constraints, beside the orders of its paper
 inner       how fast, how reliable and how near to the candidate the inner levels are, against IPOPT's defaults with a constant objective
-maf         MaF with 5 objectives, which nothing was tuned on, 5,000 evaluations: hypervolume and IGD+; nothing is asked
+maf         MaF with 5 objectives, which nothing was tuned on, 5,000 evaluations: hypervolume and IGD+; no target is set
 many        DTLZ with 5 and 8 objectives, likewise: distance from the front, hypervolume
 methods     every published problem by DFET, collocation and shooting, each in a process of its own: whether their optima agree
 parts       MACS without one of its parts at a time, on problems that nothing was tuned on: hypervolume, time, number of problems solved

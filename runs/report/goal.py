@@ -95,7 +95,7 @@ class GoalAttainment:
         """{name of a file: table} of the attainment in the end, and of the evaluations to reach shares of it."""
         heads: list[Head | str] = [Head("transcription", grouped=True), "solver", "runs"]
         heads += [Head(name, digits=4) for name in ("median attained", "lower quartile", "upper quartile")]
-        heads += [Head("median, verified", digits=4)] if self.verified else []
+        heads += [Head("median, simulated", digits=4)] if self.verified else []
         heads += [*(Head(f"evaluations to {share:g}") for share in self.goal.shares), Head("time of a run", "s", digits=3)]
         rows: list[list[Cell]] = []
         for cell, runs in self.histories.items():
@@ -106,7 +106,11 @@ class GoalAttainment:
             took = float(np.median(self.seconds[cell])) if self.seconds[cell] else None
             rows.append([*cell, b.runs, *final, *(_reached(b, share) for share in self.goal.shares), took])
         unit = f" {self.objective.unit}" if self.objective.unit else ""
-        how = ", except those verified: as simulated, of the verified points of each run in the end" if self.verified else ", not simulated"
+        how = (
+            ", except those simulated: of the points of each run in the end that are feasible when simulated"
+            if self.verified
+            else ", not simulated"
+        )
         note = (
             f"Of the best {self.objective.name} of a run so far: 1 is {self.goal.best:g}{unit}, 0 is {self.goal.worst:g}{unit}. Median and "
             "quartiles are over the runs; one without a feasible point has attained nothing. A dash: that share of runs did not reach it. "

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import os
 import platform
 import re
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import date
@@ -41,8 +43,8 @@ NAMES = {"command": "made by", "digest": "digest", "code": "code", "version": "v
 @dataclass(frozen=True)
 class PageHeader:
     """The first lines of a page of measured results, a comment:
-    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md digest: the SHA-256 of the files that state
-    what is measured, see `digest` code: macs.search 0a1b2c3d, problems 4e5f6071 version: 0.1.0 date: 2026-01-31 -->
+    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md digest: the SHA-256 of what states what
+    is measured, see `digest` code: macs.search 0a1b2c3d, problems 4e5f6071 version: 0.1.0 date: 2026-01-31 -->
     """
 
     command: str  # that makes the page
@@ -97,6 +99,17 @@ def digest(*files: str | PathLike[str], text: str = "") -> str:
     return found.hexdigest()
 
 
+def digest_of_study(file: str | PathLike[str]) -> str:
+    """The digest of a study file without its words, which change no number. Raises OSError or ValueError if it cannot be read."""
+    stated = tomllib.loads(read_whole(Path(file), DATA_BYTES).decode())
+    sections = [stated, *stated.get("paper", [])]
+    for section in sections:
+        for word in ("description", "note", "source", "differs"):
+            section.pop(word, None)
+    stated["pictures"] = sorted(stated.get("pictures", {}))
+    return digest(text=json.dumps(stated, sort_keys=True))
+
+
 Now = Callable[[str], tuple[str, Code]]
 """The digest of what states a page and the code that it depends on, as they are now, from its command; ValueError if there is no such."""
 
@@ -131,7 +144,7 @@ class Page:
         if self.path.suffix != ".md":
             raise ValueError(f"a page is a file .md, not '{path}'")
         check_target(self.path)
-        self._command, self._digest, self._definition = command, digest(file), dict(definition)
+        self._command, self._digest, self._definition = command, digest_of_study(file), dict(definition)
         self._first: list[str] = []
         self._parts: list[str] = []
         self._folded: list[str] = []

@@ -271,7 +271,7 @@ class Feasibility(PublishedTable, tag="feasibility"):
             for key, words in (("first_feasible", "first feasible"), ("all_feasible", "all feasible"))
             for more, head in (("", Head(f"{words}, mean", digits=4)), ("_median", Head("median", digits=4)), ("_never", Head("never")))
         },
-        "points": Head("not dominated, claimed", digits=4),
+        "points": Head("not dominated in the last population", digits=4),
         "counted": Head("points of a front that count", digits=4),
     }
     how: ClassVar[str] = "generations from 1, the first population; means of the runs that got there; points are means of a run."

@@ -270,11 +270,11 @@ def test_differences_from_the_best_rival_are_counted():
     text = " ".join(" ".join(contest.against_the_best(rows, "volume", contest.p_values(rows, "volume"))).split())
     assert "better on 1 (MW1), worse on 1 (MW2 to NSGA-II), no difference shown on 1 (MW3)." in text
     assert "against NSGA-II 1, 1, 1; RVEA 3, 0, 0." in text
-    assert text.endswith("Last of all by the median: on none.")
+    assert text.endswith("Last by the median, alone or with others: on none.")
     turned = [row for row in rows if row.case == "MW1"]
     turned = [Row(row.case, row.who, {"igd": row.values["volume"]}) for row in turned if row.who != "RVEA"]
     lines = contest.against_the_best(turned, "igd", contest.p_values(turned, "igd"))
-    assert "better on 0, worse on 1" in lines[0] and "Last of all by the median: MW1." in lines
+    assert "better on 0, worse on 1" in lines[0] and "Last by the median, alone or with others: MW1." in lines
     assert contest.against_the_best(rows_of("MW1", "volume", 1.0, MACS=[1]), "volume", {}) == []
 
 

@@ -21,7 +21,7 @@ from runs import Study
 from runs.batch.store import Store
 from runs.cli import main
 from runs.report.comparison import AXES, CHARGED, PROCESSOR, Charge, comparisons, histories, spent
-from runs.report.page import PageHeader, digest
+from runs.report.page import PageHeader, digest, digest_of_study
 from transcription import DFET
 from transcription.inner.base import solves_charge
 
@@ -60,7 +60,7 @@ def test_a_page_has_tables_pictures_and_where_they_are_from(place, capsys):
     assert page_of(place) == 0
     text = (place / "small.md").read_text()
     header = PageHeader.read(text)
-    assert header.digest == hashlib.sha256(TOML.encode()).hexdigest()
+    assert header.digest == digest_of_study(place / "small.toml")
     assert header.command == f"macs study report {place / 'out'} --page {place / 'small.md'} --study {place / 'small.toml'}"
     for words in ("# small", "A small study", "Of no use but here.", "6 runs", "casadi", "## goddard, dfet:2x3", "| indicator | solver |"):
         assert words in text, words
@@ -194,6 +194,17 @@ def test_header_as_written_is_read_again(tmp_path):
     gallery = replace(header, code="")
     assert PageHeader.read(str(gallery)) == gallery and not gallery.different(digest(file), {})
     assert gallery.different(digest(file), {"macs.search.macs": "1"}) == ["unknown code"]
+
+
+def test_words_of_a_study_are_not_in_its_digest(tmp_path):
+    def of(*, runs=2, note="A", differs="B", value=1.0, words="C", figure="fronts"):
+        file = tmp_path / "study.toml"
+        paper = f'[[paper]]\ndiffers = "{differs}"\nrows = [{{x = {value}}}]\n'
+        file.write_text(f'runs = {runs}  # {note}\nnote = "{note}"\npictures = {{{figure} = "{words}"}}\n{paper}')
+        return digest_of_study(file)
+
+    assert of() == of(note="D") == of(differs="D") == of(words="D")
+    assert len({of(), of(runs=3), of(value=2.0), of(figure="means")}) == 4
 
 
 @pytest.mark.parametrize("text", ["# One\n", "<!-- made by: x\ndigest: y\nversion: z -->", "<!-- made by: x"])
