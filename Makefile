@@ -33,7 +33,7 @@ docs: $(READY)
 gallery: $(READY)
 	$(BIN)/python docs/gallery/make.py
 
-# The pages of measured results that are out of date, in docs/measured, or `make pages STUDY=goddard-table3`: all within eight hours on two
+# The pages of measured results that are out of date, in docs/measured, or `make pages STUDY=goddard-table3`: all in about eight hours on two
 # processors. Stopped, the same again goes on. `python docs/measured/make.py --check` says which are out of date and why.
 pages: $(READY)
 	$(BIN)/python docs/measured/make.py $(STUDY)

@@ -31,9 +31,9 @@ class Problem:
     Attributes
     ----------
     default_transcription, default_evaluations, default_inner, default_start, default_verify
-        What is used by default; a transcription of None: DFET on a mesh that is found. A case may set its own; a transcription, too, as a
-        table of its method and settings, where phases have meshes of their own. The number of evaluations is for studies and for searches
-        that need one; MACS searches until it is done. None: it has to be stated there.
+        What is used by default, the last by the command line alone; a transcription of None: DFET on a mesh that is found. A case may
+        set its own; a transcription, too, as a table of its method and settings, where phases have meshes of their own. The number of
+        evaluations is for studies and for searches that need one; MACS searches until it is done. None: it has to be stated there.
 
     Examples
     --------

@@ -209,7 +209,7 @@ class VectorProblem:
     default_evaluations, default_verify : int or None, float
         What studies, and searches that need a number, use by default: rows that a search evaluates (None: it has to be stated there; MACS
         searches until it is done); and how much a point of a front may differ, in ranges of the front and in the constraints' scales, when
-        it is evaluated again.
+        it is evaluated again, by the command line.
 
     Examples
     --------

@@ -23,4 +23,4 @@ best.plot(costates=True)
 #
 # All happens in the first and the last few units of time; between, state and control are zero. The mesh is refined where the
 # layers are, so that a long rest costs nothing. The cost is 1e-6 above the closed form: the refinement ends once a simulation and
-# a finer mesh agree, not at the last digit. The Hamiltonian is zero but for round-off.
+# a finer mesh agree, not at the last digit. The Hamiltonian is zero but for the error of the mesh.

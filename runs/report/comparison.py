@@ -202,7 +202,7 @@ INDICATORS: Mapping[str, Callable[..., float]] = {
 }
 CURVED = ("GD", "IGD", "IGD+")
 """Indicators that take a dense reference for a curve, unless `curve` is False."""
-CHARGED, PROCESSOR = "charged evaluations", "seconds of processor"
+CHARGED, PROCESSOR, SEARCHED = "charged evaluations", "seconds of processor", "time of the search [s]"
 AXES: Mapping[str, tuple[str, str]] = {
     "evaluations": ("evaluations", "evaluations"),
     CHARGED: ("evaluations", CHARGED),
@@ -263,7 +263,7 @@ class Charge:
 
 def spent(comparison: Comparison, charge: Charge | None = None) -> dict[str, dict[str, list[float]]]:
     """{cost: {solver: a value for each finished run}}; charged evaluations and work of those that record it."""
-    keys = {key.replace("_", " "): key for key in COUNTS if key != "charge"} | {"time [s]": "wall_time"}
+    keys = {key.replace("_", " "): key for key in COUNTS if key != "charge"} | {SEARCHED: "wall_time"}
     found = {
         name: {solver: [float(run.front.stats[key]) for run in runs if key in run.front.stats] for solver, runs in comparison.runs.items()}
         for name, key in keys.items()

@@ -196,7 +196,8 @@ def convergence_figure(
             edges = (np.nan_to_num(part, neginf=outside[0], posinf=outside[1]) for part in (lower, upper))
             ax.fill_between(x, *edges, step="post", color=color, alpha=0.2, lw=0)
             drawn = np.where(np.isfinite(median), median, np.nan)
-            ax.plot(x, drawn, drawstyle="steps-post", color=color, lw=1.3, ls=("-", "--", "-.", ":")[k % 4], label=_runs(solver, b.runs, 0))
+            label = _runs(solver, b.runs, sum(not np.isfinite(y).any() for _, y in histories[solver]))
+            ax.plot(x, drawn, drawstyle="steps-post", color=color, lw=1.3, ls=("-", "--", "-.", ":")[k % 4], label=label)
         if log:
             _log_axis(ax, high / low)
             ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)

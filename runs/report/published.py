@@ -22,7 +22,7 @@ from ..files import Number, Section, Text, check_known, checked, errors_begin_wi
 from ..measures.indicators import Scale, hypervolume_at, normalised
 from ..measures.statistics import summarise
 from .choices import RunChoice, chosen
-from .comparison import Comparison, Counting, samples, spent
+from .comparison import SEARCHED, Comparison, Counting, samples, spent
 from .tables import Cell, Head, PrintedNumber, Table, table
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class Indicators(PublishedTable, tag="indicators"):
                     figures |= {"gd_mean": gd.mean, "gd_variance": gd.variance, "igd_mean": igd.mean, "igd_variance": igd.variance}
                 else:
                     figures |= {"gd_all": gd.mean, "igd_all": igd.mean}
-        times = spent(own)["time [s]"].get(solver)
+        times = spent(own)[SEARCHED].get(solver)
         return [figures | ({"seconds": float(np.mean(times))} if times else {})] if figures else []
 
     def remark(self, comparison: Comparison) -> str:
@@ -164,7 +164,10 @@ class Indicators(PublishedTable, tag="indicators"):
             return "no run found a point."
         scale = Scale.of(union.front, what=union.what, curve=False).describe().split(". Hypervolume")[0]
         own = "GD and IGD are to the points of the union of the solver's own runs, in its own ranges"
-        return f"{own}; for all solvers together, {scale[0].lower()}{scale[1:]}. Variance with divisor n - 1."
+        counted = {solver: [len(front) > 0 for front in fronts] for solver, fronts in comparison.fronts.items()}
+        some = [f"{sum(ones)} of {len(ones)} of {solver}" for solver, ones in counted.items() if not all(ones)]
+        means = f" Means are of the runs that have a point that counts: {', '.join(some)}." if some else ""
+        return f"{own}; for all solvers together, {scale[0].lower()}{scale[1:]}. Variance with divisor n - 1.{means}"
 
 
 class Hypervolume(PublishedTable, tag="hypervolume", kw_only=True):

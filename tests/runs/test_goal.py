@@ -85,7 +85,7 @@ def test_the_table_says_what_the_median_run_attained_and_when_and_failed_runs_at
     assert goal_attainments([comparison(run(1))], {"goal": COST}) == []
 
 
-def test_studies_that_verify_also_have_the_attainment_of_verified_points():
+def test_studies_that_verify_also_have_the_attainment_as_simulated():
     def points(*costs: float) -> Front:
         n = len(costs)
         F = [[cost, 0.0] for cost in costs]
@@ -94,10 +94,10 @@ def test_studies_that_verify_also_have_the_attainment_of_verified_points():
     for fronts, median in (([points(8.0, 6.0), points(), points(10.0)], "0.0"), ([points(8.0), points(), points()], "")):
         here = Comparison("p", "coarse", {"s": RUNS}, {"s": fronts}, {}, {"s": 0}, {"s": 0})
         (found,) = goal_attainments([here], {"goal": COST, "verify": 0.01})
-        assert [row["median, verified"] for row in rows(found)] == [median]
-        assert "verified points" in str(found.tables())
+        assert [row["median, simulated"] for row in rows(found)] == [median]
+        assert "feasible when simulated" in str(found.tables())
     (found,) = goal_attainments([here], {"goal": COST})
-    assert "median, verified" not in rows(found)[0]
+    assert "median, simulated" not in rows(found)[0]
 
 
 def test_a_line_for_each_transcription_from_where_the_median_run_has_something():
