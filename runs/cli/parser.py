@@ -218,12 +218,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     )
     solve.add_argument("--transcription", metavar="T", help=TRANSCRIPTION)
     solve.add_argument("--solver", metavar="NAME", default="macs", help="which search (default: macs)")
-    solve.add_argument(
-        "--evaluations",
-        metavar="N",
-        type=_positive,
-        help="candidates that may be evaluated (default: MACS until it is done, others the number of the problem)",
-    )
+    solve.add_argument("--evaluations", metavar="N", type=_positive, help="candidates that may be evaluated (default: until MACS is done)")
     solve.add_argument("--time-limit", metavar="S", type=_seconds, help="seconds after which the search ends with what it has found")
     solve.add_argument("--workers", metavar="N", type=_workers, default="all", help=WORKERS)
     solve.add_argument("--seed", metavar="S", type=_natural, help="the same one gives the same front (default: drawn, and recorded)")
@@ -246,10 +241,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     )
     solve.add_argument("--prefer", metavar="FILE.json", help="a preference that guides the search: {method: ..., settings: {...}}")
     solve.add_argument(
-        "--verify",
-        metavar="T",
-        type=_verify,
-        help="what simulated points may miss, in scales, or none: no simulation (default: the problem's own, 0.001)",
+        "--verify", metavar="T", type=_verify, help="what simulated points may miss, or none: no simulation (default: the problem's, 0.001)"
     )
     solve.add_argument("--checkpoint", metavar="FILE", help="keep the run there; killed or interrupted, the same call goes on where it was")
     solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
@@ -275,9 +267,7 @@ def _add_verify(commands: argparse._SubParsersAction[Parser]) -> None:
     verify.add_argument("--problem", metavar="PROBLEM", help="the problem, for a front that does not name one of `macs list`")
     verify.add_argument("--trust", action="store_true", help="run the code that the file names to make its problem")
     verify.add_argument("--rtol", metavar="R", type=_tolerance, default=1e-10, help="of the integrator (default: 1e-10)")
-    verify.add_argument(
-        "--tolerance", metavar="T", type=_tolerance, help="what simulated points may miss (default: the problem's own, 0.001)"
-    )
+    verify.add_argument("--tolerance", metavar="T", type=_tolerance, help="what points may miss (default: the problem's own, 0.001)")
     verify.add_argument("--workers", metavar="N", type=_workers, default="all", help=WORKERS)
 
 

@@ -102,8 +102,7 @@ def digest(*files: str | PathLike[str], text: str = "") -> str:
 def digest_of_study(file: str | PathLike[str]) -> str:
     """The digest of a study file without its words, which change no number. Raises OSError or ValueError if it cannot be read."""
     stated = tomllib.loads(read_whole(Path(file), DATA_BYTES).decode())
-    sections = [stated, *stated.get("paper", [])]
-    for section in sections:
+    for section in (stated, *stated.get("paper", [])):
         for word in ("description", "note", "source", "differs"):
             section.pop(word, None)
     stated["pictures"] = sorted(stated.get("pictures", {}))

@@ -164,8 +164,8 @@ class Indicators(PublishedTable, tag="indicators"):
             return "no run found a point."
         scale = Scale.of(union.front, what=union.what, curve=False).describe().split(". Hypervolume")[0]
         own = "GD and IGD are to the points of the union of the solver's own runs, in its own ranges"
-        counted = {solver: [len(front) > 0 for front in fronts] for solver, fronts in comparison.fronts.items()}
-        some = [f"{sum(ones)} of {len(ones)} of {solver}" for solver, ones in counted.items() if not all(ones)]
+        points = {solver: [*map(len, fronts)] for solver, fronts in comparison.fronts.items()}
+        some = [f"{np.count_nonzero(one)} of {len(one)} of {solver}" for solver, one in points.items() if not all(one)]
         means = f" Means are of the runs that have a point that counts: {', '.join(some)}." if some else ""
         return f"{own}; for all solvers together, {scale[0].lower()}{scale[1:]}. Variance with divisor n - 1.{means}"
 
