@@ -1,5 +1,6 @@
 """Pages of measured results: each has a header, a command that exists, and files that it is of."""
 
+import csv
 import importlib.util
 import re
 import subprocess
@@ -116,6 +117,12 @@ def test_a_page_has_the_words_of_its_study(page):
         stated = [study.description, study.note, *study.pictures.values()]
         stated += [one[word] for one in study.paper for word in ("source", "note", "differs") if word in one]
         assert [words for words in stated if with_count(words, {"runs": study.runs}) not in text] == []
+
+
+def test_runs_without_a_point_are_infinitely_far_away_in_the_data():
+    rows = [row for file in SCRIPT.parent.glob("*.csv") for row in csv.DictReader(file.read_text(encoding="utf-8").splitlines())]
+    empty = [row for row in rows if row["points"] == "0" and row["IGD"]]
+    assert empty and {(row["GD"], row["IGD"]) for row in empty} == {("inf", "inf")}
 
 
 def test_the_index_of_papers_leads_somewhere(monkeypatch, tmp_path):

@@ -107,9 +107,7 @@ def runs_table(found: Sequence[Comparison]) -> Table:
                 stats, cpu, points = run.front.stats, run.history.get("cpu") or [None], len(comparison.fronts[solver][i])
                 costs = [stats["evaluations"], stats["gradient_solves"], cpu[-1], run.wall_time]
                 # A run without a point that counts is as far away as can be, by GD, too.
-                values = [
-                    np.nan_to_num(measured[name][solver][i], nan=np.inf) if measured else None for name in ("GD", "IGD", "hypervolume")
-                ]
+                values = [np.fmin(measured[name][solver][i], np.inf) if measured else None for name in ("GD", "IGD", "hypervolume")]
                 rows.setdefault(run.path, [comparison.shown, run.cell.transcription, solver, run.number, *costs, points, *values])
     heads: list[Head | str] = [*(Head(name, grouped=True) for name in ("problem", "transcription")), "solver", "run"]
     heads += ["evaluations", "gradient solves", Head("processor", "s"), Head("time", "s"), "points", "GD", "IGD", "hypervolume"]
