@@ -36,7 +36,7 @@ def draw_degrees(
     with styled():
         if ax is None:
             ax = new_figure(max(4.6, 1.2 + 0.45 * values.size), 3.4).add_subplot()
-        width = 0.8 / len(values)
+        width, upright = 0.8 / len(values), 90 * (len(values) > 4)  # numbers are wider than so many bars
         top = float(np.nanmax(values, initial=0.0))
         bottom = float(np.nanmin(values, initial=0.0))
         for k, (name, row) in enumerate(zip(degrees, values, strict=True)):
@@ -45,9 +45,8 @@ def draw_degrees(
             ax.bar(places, row, 0.9 * width, color=color, label=name, zorder=3, hatch="" if k < len(COLORS) else "//")
             for x, degree in zip(places, row, strict=True):
                 if np.isfinite(degree):
-                    ax.annotate(
-                        f"{round(degree, 2) + 0.0:.2f}", (x, max(degree, 0.0)), (0, 2), textcoords="offset points", ha="center", fontsize=7
-                    )
+                    text, place = f"{round(degree, 2) + 0.0:.2f}", (x, max(degree, 0.0))
+                    ax.annotate(text, place, (0, 2), textcoords="offset points", ha="center", fontsize=7, rotation=upright)
         ax.set_xticks(range(len(names)), names)
         ax.tick_params(axis="x", length=0)
         ax.set_ylabel(label)

@@ -136,7 +136,7 @@ def lambda_figures(every: Sequence[RunChoice]) -> list[Figure]:
                     ax.plot(weights, line, "o-", ms=3, lw=1.2, color=color, label=name)
                 ax.axhline(0.0, color="black", lw=0.6)
                 ax.set(xlabel="lambda", ylabel="membership, kappa")
-                legend(figure, ax, f"first {' and '.join(priorities[0])}")
+                legend(figure, ax, f"first priority: {' and '.join(priorities[0])}")
             found.append(figure)
     return found
 
