@@ -43,8 +43,8 @@ NAMES = {"command": "made by", "digest": "digest", "code": "code", "version": "v
 @dataclass(frozen=True)
 class PageHeader:
     """The first lines of a page of measured results, a comment:
-    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md digest: the SHA-256 of what states what
-    is measured, see `digest` code: macs.search 0a1b2c3d, problems 4e5f6071 version: 0.1.0 date: 2026-01-31 -->
+    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md digest: the SHA-256 of its
+    study without words, or of the files of a bench code: macs.search 0a1b2c3d, problems 4e5f6071 version: 0.1.0 date: 2026-01-31 -->
     """
 
     command: str  # that makes the page
@@ -106,7 +106,7 @@ def digest_of_study(file: str | PathLike[str]) -> str:
         for word in ("description", "note", "source", "differs"):
             section.pop(word, None)
     stated["pictures"] = sorted(stated.get("pictures", {}))
-    return digest(text=json.dumps(stated, sort_keys=True))
+    return digest(text=json.dumps(stated, sort_keys=True, default=str))
 
 
 Now = Callable[[str], tuple[str, Code]]

@@ -16,6 +16,7 @@ from runs import Study
 from runs.batch.store import Store
 from runs.files import from_record, to_record
 from runs.report.comparison import Counting, comparisons
+from runs.report.comparison_tables import runs_table
 
 MEASURES = [
     {"name": "miss", "state": "x", "at": 2.0, "unit": "cm", "factor": 100.0},
@@ -121,6 +122,8 @@ def test_the_report_says_how_many_were_claimed(folder):
         assert int(rows[solver]["verified"]) == sum(one.verified for one in runs)
         defects = np.concatenate([run.front.defect for run in comparison.runs[solver]])
         assert float(rows[solver]["median defect of a claim"]) == pytest.approx(np.nanmedian(defects), rel=0.05)
+    comparison.fronts["macs"] = [front[[]] for front in comparison.fronts["macs"]]
+    assert [row[-4:] for row in runs_table([comparison]).rows if row[2] == "macs"] == [(0, np.inf, np.inf, 0.0)] * 2
 
 
 def test_published_measures_and_feasibility_beside_ours(folder):
