@@ -54,7 +54,10 @@ OWN = {
 """Module within `cases` and function of each case, and one line on it."""
 CASES: dict[str, tuple[str, str]] = {
     **{name: (f"problems.cases.{address}", text) for name, (address, text) in OWN.items()},
-    **{STANDARD + name: (at, f"{'of others' if 'wild' in at else 'published'}: {text}") for name, (at, text) in standard.cases().items()},
+    **{
+        STANDARD + name: (address, f"{'of others' if name in standard.ASKED_ABOUT else 'published'}: {text}")
+        for name, (address, text) in standard.cases().items()
+    },
 }
 FORMER = {
     "problems.cases.betts:problem": "betts",

@@ -1,9 +1,9 @@
 """Makes the pages of measured results: `python docs/measured/make.py` makes those that are out of date, the cheapest first, `--check` says
 which these are and why; names of pages make only these.
 
-A page is out of date once what states it, a study file or the modules of a benchmark, or the code that its results depend on is another
-than when they were made; comments and docstrings are no code. `pages.toml` has all pages, with the minutes of a processor that each takes.
-Killed or interrupted, the same command goes on with the runs that are missing; those in `out` by other code are made again.
+A page is out of date once what states it, a study but its words or the modules of a benchmark, or the code that its results depend on is
+another than when they were made; comments and docstrings are no code. `pages.toml` has all pages, with the minutes of a processor that each
+takes. Killed or interrupted, the same command goes on with the runs that are missing; those in `out` by other code are made again.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ import numpy as np
 from macs import Front, optimize
 from macs.io.console import Steps
 from problems import load
-from problems.cases.standard import SHARE, PublishedOptimum, cases, published
+from problems.cases.standard import ASKED_ABOUT, SHARE, PublishedOptimum, cases, published
 from problems.catalogue import STANDARD as FOLDER
 from problems.problem import Problem
 from transcription import Meshed, MultipleShooting, Transcription, parse
@@ -25,8 +25,6 @@ from ..execution.processes import CRASHED, TIMEOUT, lines_apart
 from ..execution.task import peak_memory
 from .contract import ASKED, Bench, Column, Effort, Row, Target, column
 
-ASKED_ABOUT = tuple(name for name, (address, _) in cases().items() if ".wild:" in address)
-"""Problems that others asked about, which are no part of `macs bench standard`."""
 RIGHT, WRONG, VERIFIED, UNVERIFIED, FAILED = "right", "WRONG", "verified", "not verified", "FAILED"
 
 

@@ -88,29 +88,27 @@ class GoalAttainment:
     goal: StatedGoal
     objective: Objective
     histories: dict[tuple[str, str], Sequence[History]] = field(default_factory=dict)
-    verified: dict[tuple[str, str], Sequence[float]] = field(default_factory=dict)  # empty where points are not simulated
+    simulated: dict[tuple[str, str], Sequence[float]] = field(default_factory=dict)  # empty where points are not simulated
     seconds: dict[tuple[str, str], Sequence[float]] = field(default_factory=dict)
 
     def tables(self) -> dict[str, Table]:
         """{name of a file: table} of the attainment in the end, and of the evaluations to reach shares of it."""
         heads: list[Head | str] = [Head("transcription", grouped=True), "solver", "runs"]
         heads += [Head(name, digits=4) for name in ("median attained", "lower quartile", "upper quartile")]
-        heads += [Head("median, simulated", digits=4)] if self.verified else []
+        heads += [Head("median, simulated", digits=4)] if self.simulated else []
         heads += [*(Head(f"evaluations to {share:g}") for share in self.goal.shares), Head("time of a run", "s", digits=3)]
         rows: list[list[Cell]] = []
         for cell, runs in self.histories.items():
             b = band(runs, larger=True, moments=sum(len(x) for x, _ in runs))
             final: list[Cell] = [_finite(part[-1]) for part in (b.median, b.lower, b.upper)]
             # NaN is worse than any.
-            final += [_finite(np.median(np.nan_to_num(self.verified[cell], nan=-np.inf)))] if self.verified else []
+            final += [_finite(np.median(np.nan_to_num(self.simulated[cell], nan=-np.inf)))] if self.simulated else []
             took = float(np.median(self.seconds[cell])) if self.seconds[cell] else None
             rows.append([*cell, b.runs, *final, *(_reached(b, share) for share in self.goal.shares), took])
         unit = f" {self.objective.unit}" if self.objective.unit else ""
-        how = (
-            ", except those simulated: of the points of each run in the end that are feasible when simulated"
-            if self.verified
-            else ", not simulated"
-        )
+        how = ", not simulated"
+        if self.simulated:
+            how = ", except those simulated: of the points of each run in the end that are feasible when simulated"
         note = (
             f"Of the best {self.objective.name} of a run so far: 1 is {self.goal.best:g}{unit}, 0 is {self.goal.worst:g}{unit}. Median and "
             "quartiles are over the runs; one without a feasible point has attained nothing. A dash: that share of runs did not reach it. "
@@ -134,7 +132,7 @@ class GoalAttainment:
 
 
 def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]) -> list[GoalAttainment]:
-    """The attainment of the goal that a study states, on each of its problems; also by verified points if it verifies. Empty if there is
+    """The attainment of the goal that a study states, on each of its problems; also as simulated if it verifies. Empty if there is
     no goal."""
     if study.get("goal") is None:
         return []
@@ -150,7 +148,7 @@ def goal_attainments(comparisons: Sequence[Comparison], study: Mapping[str, Any]
             if known:
                 here.histories[cell], here.seconds[cell] = known, [run.wall_time for run in runs]
             if known and study.get("verify") is not None:
-                here.verified[cell] = [*map(goal.of_front, comparison.fronts[solver]), *[np.nan] * failed]
+                here.simulated[cell] = [*map(goal.of_front, comparison.fronts[solver]), *[np.nan] * failed]
     return [one for one in found.values() if one.histories]
 
 

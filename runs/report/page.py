@@ -43,12 +43,12 @@ NAMES = {"command": "made by", "digest": "digest", "code": "code", "version": "v
 @dataclass(frozen=True)
 class PageHeader:
     """The first lines of a page of measured results, a comment:
-    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md digest: the SHA-256 of its
-    study without words, or of the files of a bench code: macs.search 0a1b2c3d, problems 4e5f6071 version: 0.1.0 date: 2026-01-31 -->
+    <!-- made by: macs study report out/goddard-table3 --page docs/measured/goddard-table3.md digest: the SHA-256 of what
+    states it code: macs.search 0a1b2c3d, problems 4e5f6071 version: 0.1.0 date: 2026-01-31 -->
     """
 
     command: str  # that makes the page
-    digest: str  # digest, code: The page is out of date once they are others. Of the study file, of the files of a bench, or of problems
+    digest: str  # digest, code: The page is out of date once they are others. Of a study but its words, or of files
     version: str  # of this package
     date: str  # year-month-day
     code: str = ""  # that made its results: the folders of modules that they depend on, each with a digest, see `batch.code`

@@ -12,6 +12,7 @@ from . import climb, curves, delta_iii, flight, low_thrust, paths, phases, singu
 from .published import SHARE, PublishedOptimum, cases, published
 
 __all__ = [
+    "ASKED_ABOUT",
     "SHARE",
     "PublishedOptimum",
     "cases",
@@ -28,3 +29,5 @@ __all__ = [
     "switching",
     "wild",
 ]
+ASKED_ABOUT = tuple(name for name, (address, _) in cases().items() if address.startswith(f"{wild.__name__}:"))
+"""Problems that others asked about."""
