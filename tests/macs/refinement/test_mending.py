@@ -60,10 +60,7 @@ def test_a_search_with_few_points_gets_more_in_their_gaps(unverified) -> None:
 
 @pytest.mark.parametrize(
     ("step", "result", "why"),
-    [
-        ("_between", "did not converge", "solves for more: 3 did not converge."),
-        ("_most_work", 0.0, "the work for more was used up."),
-    ],
+    [("_between", "did not converge", "solves for more: 3 did not converge."), ("_most_work", 0.0, "the work for more was used up.")],
 )
 def test_a_front_says_why_points_are_missing(unverified, monkeypatch, step, result, why) -> None:
     few = unverified.verify(1e-3)
