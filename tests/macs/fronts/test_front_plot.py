@@ -318,13 +318,13 @@ def test_dots_are_ends_of_phases_and_hollow_nodes_of_what_is_not_verified():
 
 
 @pytest.mark.parametrize(
-    ("front", "points", "said"), [(flights(3), [], "one to"), (flights(9), range(8), "one to"), (black_box(), [2], "2 has no")]
+    ("front", "points", "said"), [(flights(3), [], "one to"), (flights(9), range(9), "one to"), (black_box(), [2], "2 has no")]
 )
 def test_what_cannot_be_drawn_is_said(front, points, said):
     with pytest.raises(ValueError, match=said):
         front.plot_trajectories(points)
-    with pytest.raises(ValueError, match="at most 7"):
-        flights(9).plot(marked=range(8))
+    with pytest.raises(ValueError, match="at most 8"):
+        flights(9).plot(marked=range(9))
 
 
 @pytest.mark.parametrize("objectives", [2, 4])
