@@ -80,7 +80,7 @@ class Script:
 
     def digest(self) -> str:
         """The digest of its problems, of their fingerprints."""
-        return digest(text=" ".join(map(fingerprint, self.cases)))
+        return digest(" ".join(map(fingerprint, self.cases)))
 
     def header(self) -> PageHeader:
         """That of a page which is made now."""

@@ -22,7 +22,7 @@ from runs.batch.code import code_of_measures, merged
 from runs.bench import BENCHES
 from runs.bench.contest import CONTESTS
 from runs.cli.parser import build_parser
-from runs.report.page import digest, digest_of_study, print_standing, standing
+from runs.report.page import digest_of_bench, digest_of_study, print_standing, standing
 from runs.study import Study
 
 HERE = Path(__file__).parent
@@ -64,7 +64,7 @@ def now(command: str) -> tuple[str, dict[str, str]]:
     """The digest of what states a page and the code that it depends on, from its command. Raises ValueError if there is no such command."""
     files = files_of(command)
     if files[0].suffix != ".toml":
-        return digest(*files), BENCHES[shlex.split(command)[2]].code
+        return digest_of_bench(files), BENCHES[shlex.split(command)[2]].code
     study = Study.load(files[0])
     return digest_of_study(files[0]), {**merged(study.code(cell) for cell in study.cells), **code_of_measures()}
 

@@ -36,7 +36,7 @@ def code_of(seeds: Collection[str], without: Sequence[str] = ()) -> dict[str, st
         if module not in found and not any(f"{module}.".startswith(f"{one}.") for one in left):
             path = _path(module)
             if path.name != "__init__.py" and path.exists():
-                found[module] = _digest(path)
+                found[module] = digest_of_file(path)
                 todo += [_defining(*one) for one in _imports(path)]
     return dict(sorted(found.items()))
 
@@ -58,7 +58,7 @@ def imported(files: Sequence[Path]) -> list[str]:
 def code_of_measures() -> dict[str, str]:
     """The code that makes numbers of the fronts of runs."""
     files = sorted((FLOORS / "runs" / "measures").glob("*.py"))
-    return {f"runs.measures.{one.stem}": _digest(one) for one in files}
+    return {f"runs.measures.{one.stem}": digest_of_file(one) for one in files}
 
 
 def merged(several: Iterable[Code]) -> dict[str, str]:
@@ -90,7 +90,8 @@ def changed(one: Code, other: Code) -> list[str]:
 
 
 @cache
-def _digest(path: Path) -> str:
+def digest_of_file(path: Path) -> str:
+    """That of the code in it, without comments and docstrings."""
     return _short(" ".join(_words(_tree(path))))
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from macs.io.atomic import write_whole
 from macs.io.interrupts import Stopped
 
-from ..report.page import PageHeader, digest
+from ..report.page import PageHeader, digest_of_bench
 from .contest import CONTESTS
 from .contract import Bench, Row, save
 from .curve import CURVE
@@ -115,5 +115,5 @@ def header_of(
     words += ["--jobs", str(jobs)] if jobs > 1 else []
     words += ["--solvers", *solvers] if solvers else []
     return PageHeader.now(
-        shlex.join(["macs", "bench", kind, *words, "--page", str(page)]), digest(*BENCHES[kind].sources), BENCHES[kind].code
+        shlex.join(["macs", "bench", kind, *words, "--page", str(page)]), digest_of_bench(BENCHES[kind].sources), BENCHES[kind].code
     )

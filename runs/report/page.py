@@ -22,7 +22,7 @@ from macs.fronts.provenance import versions
 from macs.io.atomic import check_target, read_whole, write_whole
 from macs.io.text import counted, duration
 
-from ..batch.code import SEVERAL, UNKNOWN, Code, changed, code_of_measures, merged, rooms
+from ..batch.code import SEVERAL, UNKNOWN, Code, changed, code_of_measures, digest_of_file, merged, rooms
 from ..batch.store import Store, StudySummary
 from ..files import DATA_BYTES
 from .comparison_tables import medians_table, runs_table
@@ -48,7 +48,7 @@ class PageHeader:
     """
 
     command: str  # that makes the page
-    digest: str  # digest, code: The page is out of date once they are others. Of a study but its words, or of files
+    digest: str  # digest, code: The page is out of date once they are others. Of a study but its words, or of the code of a benchmark
     version: str  # of this package
     date: str  # year-month-day
     code: str = ""  # that made its results: the folders of modules that they depend on, each with a digest, see `batch.code`
@@ -62,7 +62,8 @@ class PageHeader:
     @classmethod
     def now(cls, command: str, digest: str, code: Code) -> PageHeader:
         """The header of a page that this command makes today, with the digest of what states it and the code that made its results."""
-        return cls(command, digest, versions()["macs-trajectories"], date.today().isoformat(), written(code))
+        written = ", ".join(f"{room} {digest}" for room, digest in rooms(code).items())
+        return cls(command, digest, versions()["macs-trajectories"], date.today().isoformat(), written)
 
     @classmethod
     def read(cls, text: str) -> PageHeader:
@@ -86,17 +87,14 @@ class PageHeader:
         ]
 
 
-def written(code: Code) -> str:
-    """Folders of code with their digests, in a line."""
-    return ", ".join(f"{room} {digest}" for room, digest in rooms(code).items())
+def digest(text: str) -> str:
+    """The SHA-256 of a text, in hexadecimal digits."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
-def digest(*files: str | PathLike[str], text: str = "") -> str:
-    """The SHA-256, in hexadecimal digits, of a text and the content of files, one after the other. Raises OSError if one cannot be read."""
-    found = hashlib.sha256(text.encode())
-    for one in files:
-        found.update(read_whole(Path(one), DATA_BYTES))
-    return found.hexdigest()
+def digest_of_bench(files: Iterable[Path]) -> str:
+    """The digest of the code of files."""
+    return digest(" ".join(map(digest_of_file, files)))
 
 
 def digest_of_study(file: str | PathLike[str]) -> str:
@@ -106,7 +104,7 @@ def digest_of_study(file: str | PathLike[str]) -> str:
         for word in ("description", "note", "source", "differs"):
             section.pop(word, None)
     stated["pictures"] = sorted(stated.get("pictures", {}))
-    return digest(text=json.dumps(stated, sort_keys=True, default=str))
+    return digest(json.dumps(stated, sort_keys=True, default=str))
 
 
 Now = Callable[[str], tuple[str, Code]]

@@ -19,7 +19,7 @@ from ...evaluation.evaluator import CONVERGED
 from ...io.text import label
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255", "#332288")
-"""Colours that readers with any colour vision can distinguish: of Okabe and Ito, but for black, which is for references, and two dark ones of Tol."""
+"""Colours that any colour vision can distinguish: of Okabe and Ito, but for black, which is for references, and two dark ones of Tol."""
 
 
 GREY = "#666666"
