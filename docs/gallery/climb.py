@@ -20,6 +20,6 @@ best.plot(costates=True)
 # What was learned
 #
 # The aircraft accelerates near the ground, climbs, dives a little to gain speed through the sound barrier, and pulls up at the end: a
-# climb is not steep all along. Found are 320.48 s, 0.02 s more than YAPSS has; a comparison in the fourth digit depends on how tables
+# climb is not steep all along. The time is 320.48 s, 0.02 s more than in YAPSS; a comparison in the fourth digit depends on how tables
 # are interpolated. The costates of altitude and path angle are rough in the first seconds, where the altitude is on its lower bound
 # and the path angle has to follow it.

@@ -31,4 +31,4 @@ front.plot_trajectories([0, 4, 9])
 # grows evenly with time. The quickest ascent thrusts straight up and then straight down, on both bounds of the angle, and has no
 # horizontal speed; along the front the angle becomes a smooth tangent law, and no bound acts but the longest time of 250 s. All
 # points are verified. They differ most from the closed form at the quickest ascent, where the front is vertical. Most of the work
-# are 51 gradient solves, half of them from other starts.
+# is 51 gradient solves, half of them from other starts.

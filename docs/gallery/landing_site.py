@@ -25,4 +25,4 @@ front.plot_trajectories(some)
 # Safe ground is far away: the hazard falls by flying farther, and the cheapest steps are the first ones. The true front is in
 # many pieces, since each lander ends in a hollow, or in another. In this short run neither way finds all of them: most points of
 # both are above the true front, those of the sweep somewhat less. All points are verified, and all are locally optimal: neither
-# says that a better hollow is not next to it. A search needs more than the 3,000 evaluations of this script here.
+# rules out a better hollow close by. A search needs more than the 3,000 evaluations of this script here.
