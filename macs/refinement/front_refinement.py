@@ -159,7 +159,7 @@ class FrontRefinement:
         self.solves = GradientSolves(min(0.1 * wanted.tolerance, float(front.stats["tolerance"])), max_iterations)
         self.loop = MeshLoop(programs or Programs(front.compiled()), self.solves, wanted, limit, most_work, enough=enough, more=more)
         self.methods = {i: self._method(front[i]) for i in self.chosen}
-        self._first = first
+        self.rows, self._first = [front[[i]] for i in range(len(front))], first
         self.found: dict[int, RefinedPoint] = {}
 
     def go(self, show: Any = lambda words: None) -> None:
@@ -173,7 +173,7 @@ class FrontRefinement:
             return
         first = self.chosen[0]
         nlp = self.loop.programs(self.methods[first])
-        fixed, found = fixed_scales(self.front), self.loop.units(self.front.F[self.good], nlp, self.front[first].decision)
+        fixed, found = fixed_scales(self.front), self.loop.units(self.front.F[self.good], nlp, self.rows[first][0].decision)
         self.units = np.where(np.isnan(fixed), found, fixed)
         ends = self._ends()
         between = [i for i in self.chosen if i not in ends]
@@ -196,15 +196,9 @@ class FrontRefinement:
 
     def points(self, elapsed: float, stopped: str) -> Points:
         """The front with the refined points, in the same order, and their costs."""
-        front = self.front
-        rows, reached = [front[[i]] for i in range(len(front))], sum(point.good for point in self.found.values())
-        for i, one in ((i, self.found.get(i)) for i in self.chosen):
-            if one is None or one.columns is None:
-                rows[i] = rows[i].replace(notes=[NOT_BEGUN if one is None else one.note or front[i].note])
-            else:
-                about: dict[str, Any] = {"goals": front.goals, "problem": front.compiled(), "solver": front.solver, "stats": front.stats}
-                rows[i] = Points(**one.columns, notes=[one.note], **about)
-        return Points.concatenate(rows).replace(
+        front, reached = self.front, sum(point.good for point in self.found.values())
+        left = {i: self.rows[i].replace(notes=[NOT_BEGUN]) for i in self.chosen if i not in self.found}
+        return Points.concatenate([left.get(i, row) for i, row in enumerate(self.rows)]).replace(
             tolerances=front.tolerances,
             within=front.within,
             solver=dict(front.solver),
@@ -235,7 +229,7 @@ class FrontRefinement:
 
     def _is_end(self, i: int, mine: np.ndarray) -> bool:
         """Whether the best point in the objective that is marked (m,) is an optimum of that alone. Another local optimum may be better."""
-        nlp, point = self.loop.programs(self.methods[i]), self.front[i]
+        nlp, point = self.loop.programs(self.methods[i]), self.rows[i][0]
         known = self._known(i)
         if known and optimality(nlp, point.decision, np.where(mine, self.units, np.inf)) <= FRONT.stationary:
             return True
@@ -248,12 +242,12 @@ class FrontRefinement:
 
     def _known(self, i: int) -> bool:
         """Whether a point is known to be optimal on its own mesh."""
-        certified = self.front[i].optimality
+        certified = self.rows[i][0].optimality
         return certified is not None and certified <= FRONT.optimal
 
     def _gaining(self, i: int) -> float:
         """What a point is known to gain where it begins, if that is more than it may."""
-        gain = float(self.front.gain[i])
+        gain = self.found[i].gain if i in self.found else float(self.front.gain[i])
         return gain if gain > self.wanted.gained else 0.0
 
     def _distance(self, i: int, j: int) -> float:
@@ -272,11 +266,19 @@ class FrontRefinement:
         for i, one in zip(tasks, found, strict=True):
             old = self.found.get(i)
             if one is not None and (old is None or (one.good, -one.gain) > (old.good, -old.gain)):
-                self.found[i] = one
+                self.found[i], self.methods[i], self.rows[i] = one, one.method, self._row(i, one)
+
+    def _row(self, i: int, one: RefinedPoint) -> Points:
+        """The refined point as a set of one point."""
+        front = self.front
+        if one.columns is None:
+            return self.rows[i].replace(notes=[one.note or front[i].note])
+        about: dict[str, Any] = {"goals": front.goals, "problem": front.compiled(), "solver": front.solver, "stats": front.stats}
+        return Points(**one.columns, notes=[one.note], **about)
 
     def _begun(self, i: int, task: Scalarised) -> PointToRefine:
-        """A point as it is, with the meshes of the nearest one that is done."""
-        point, trajectory = self.front[i], self._trajectory(i)
+        """A point as it is by now, with the meshes of the nearest one that is done."""
+        point, trajectory = self.rows[i][0], self._trajectory(i)
         near = sorted((j for j in self.chosen if j != i), key=lambda j: self._distance(i, j))[: FRONT.neighbours]
         others, hints, done = [self._trajectory(j) for j in near], self._hints(i, task), self._nearest(i)
         far = hints if self._first or done is None else done.meshes[-2:]
@@ -299,7 +301,6 @@ class FrontRefinement:
         return [] if nearest is None or self.wanted.confirmed or isinstance(task, LexicographicEnd) else [nearest.method]
 
     def _trajectory(self, i: int) -> Trajectory:
-        found = self.found.get(i)
-        trajectory = self.front[i].trajectory if found is None else found.trajectory
+        trajectory = self.rows[i][0].trajectory
         assert trajectory is not None
         return trajectory

@@ -8,14 +8,16 @@ import pytest
 from fronts import distance_to_curve
 from synthetic_fronts import black_box, flights
 
-from macs import MACS, Front
+from macs import MACS, Front, sweep
 from macs.fronts.builders import trajectory_columns
 from macs.fronts.verification import verify
 from macs.gradients.scalarised import GradientSolves
+from macs.refinement.front_refinement import FrontRefinement
 from problems import Problem, load
 from problems.cases.goddard import reference
-from transcription import DFET
+from transcription import DFET, from_dict
 from transcription.inner import Ipopt
+from transcription.meshes.verdict import Wanted
 from transcription.nlp.scalarized import scalarize
 
 
@@ -126,6 +128,18 @@ def test_ctrl_c_while_a_point_is_solved_adds_no_note_to_that_point(coarse, monke
 
 
 @pytest.mark.slow
+def test_a_point_that_is_refined_again_begins_where_it_was_left():
+    front = sweep(load("goddard"), DFET(3, 2), points=3, starts=1, verify=None)
+    job = FrontRefinement(front, Wanted(1e-7, feasible=1e-6), limit=1)
+    good = []
+    for _ in range(2):
+        job.go()
+        meshes = [from_dict(point.transcription).mesh_of("ascent").elements for point in job.points(0.0, "")]
+        assert meshes == [len(point.trajectory["ascent"].state.edges) - 1 for point in job.points(0.0, "")]
+        good.append(sum(one.good for one in job.found.values()))
+    assert good[0] <= good[1] and max(meshes) > 3
+
+
 def test_points_that_did_not_converge_stay_as_they_are():
     bad = front_with_a_bad_point()
     assert bad.refine_mesh(limit=1)[1].status == "infeasible"
