@@ -217,7 +217,7 @@ class Front(Points):
         Parameters
         ----------
         until : float or Transcription, optional
-            A tolerance: the largest defect of a state, in units of what it does on the trajectory. In ranges of the front, the objectives
+            A tolerance: the largest defect of a state, relative to its range on the trajectory. In ranges of the front, the objectives
             may change by ten times this from mesh to mesh, and when simulated. Controls may not leave their bounds at all; states and path
             constraints by the front's tolerance. Where dynamics are so unstable that no simulation can follow, each element is simulated by
             itself, and `Point.note` says so. Or a transcription. Default: until points are verified.
@@ -282,14 +282,14 @@ class Front(Points):
         Points of a vector problem are evaluated again. Every solver and gradient tool does so at its end. A point is `verified` if nothing
         differs by more than the tolerance: its states, in spans of their bounds; its bounds, final values, paths and constraints, controls
         between nodes included, in their scales (the scale of an equality or a limit on one side is at least its size); and its objectives,
-        in units that each point keeps once it was judged (`Point.tolerances`), so that a part of a front, or a union of fronts, is judged
-        like the whole. The unit is the stated `scale`; else the range between the best points of each objective, as simulated, of those
-        that are feasible so; of one objective, its size or, if larger, the sizes of its terms, added up.
+        in units that are fixed at a point's first verification (`Point.tolerances`), so that parts and unions of fronts are judged
+        alike. The unit is the objective's `scale`; without one, its range over the points that are best in one objective, as simulated
+        and feasible; for a single objective, its size or the sum of the sizes of its terms, whichever is larger.
 
         Parameters
         ----------
         tolerance : float or None
-            None: the points are not simulated.
+            Largest error of a verified point, in the units above. None: the points are not simulated.
         workers : int, "all" or Executor, optional
             Processes that simulate side by side, see `optimize`.
 

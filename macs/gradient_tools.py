@@ -91,11 +91,11 @@ def optimize(
     tolerance : float
         Largest scaled residual of a feasible point.
     verify : float, optional
-        How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: it is not simulated.
+        Largest error, scaled as in `Front.verify`, that an independent simulation may show in a `verified` point. None: not simulated.
     max_iterations : int
         Most iterations of IPOPT in one solve, all its strategies together.
     time_limit : float, optional
-        Seconds after which the work ends with its results so far, as it does after Ctrl-C.
+        Seconds after which the results so far are returned, as after Ctrl-C. With none, `optimize` on its own mesh raises TimeoutError.
     workers : int, "all" or Executor, optional
         Processes that work side by side, "all" for one for each core, or a `concurrent.futures.Executor`. The result is the
         same, to the last bit. Other processes than this one begin after a second of work. Default: 1.
@@ -155,7 +155,7 @@ def payoff(
     -------
     Front
         Exactly one point for each objective, in the order of their declaration. The `status` of a point says whether it converged. Where
-        nothing feasible is found, all are the one that violates least, and `message` says what.
+        nothing feasible is found, all are the least infeasible point, and `message` names what it violates.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def sweep(
         As for `optimize`; each point is solved from so many `starts`. "auto": the optimum of each objective from as many as pay, see
         `payoff`; the points between, each from the one before, then from others as long as these find better ones.
     points : int, optional
-        Number of points, the ends included; with three or more objectives, the largest number. Default: as many as `error` takes.
+        Number of points, ends included; a maximum with three or more objectives. Default: what `error` takes; needed where it has no use.
     error : float, optional
         With two objectives, instead of a number of points: points are solved where the curve of the front errs most (`Front.curve`), until
         its estimated error, in ranges of the objectives, is less; at most 100. Kinks and gaps are found on the way. Default: 1e-3.

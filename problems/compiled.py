@@ -64,7 +64,7 @@ def computed(
 class Variable:
     """A state, control, parameter or time: its bounds, and how it is shown and scaled.
 
-    `scale` is in the variable's unit; it defaults to the span of the bounds. `period` is None unless the variable is an angle-like
+    `scale` is in the variable's unit: 1 here, the span of the bounds for declared variables. `period` is None unless it is an angle-like
     quantity of which `bounds` are exactly one period. One of several `choices` has the number of its choice as its value, from 0.
 
     Parameters
@@ -227,7 +227,7 @@ class CompiledPhase(Deriving):
     """One phase as plain data and Functions.
 
     Every Function takes `(x, u, t, s)`: states (nx), controls (nu), time, and `s = [t0, tf, *parameters]`. `dynamics` returns the rates
-    (nx) per `time_unit`; `paths`, `initials`, `finals`, `integrands`, `peaks` return columns, one row for each expression of that kind.
+    (nx) per `time_unit`; `path`, `initials`, `finals`, `integrands`, `peaks` return columns, one row for each expression of that kind.
 
     Attributes
     ----------

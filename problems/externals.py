@@ -49,7 +49,7 @@ def external(
     """What a function of arrays returns, as an expression: rates for `Phase.dynamics`, or part of any other expression.
 
     It is called once for all points of a step, or for all perturbations of these. The same row must always give the same, whatever rows
-    stand beside it; NaN is outside of its domain. What it raises ends the work.
+    stand beside it; NaN means outside its domain. An exception in it ends the work.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def external(
         time last or left out. Where complex steps turn out wrong, a warning says so and differences are used. Of a library, the
         derivatives that it exports, or differences.
     outputs : sequence of str or int, optional
-        Names of what is returned, or how many there are; by default the states, else as many as a trial returns.
+        Names of what is returned, or their number. Default: the names of `states` if a trial call returns as many values, else that number.
 
     Returns
     -------

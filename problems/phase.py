@@ -94,7 +94,7 @@ class Phase:
         unit : str
             A label, carried to tables, plots and files.
         scale : float, optional
-            What counts as one in residuals; the span of the bounds by default.
+            Residuals of the state are divided by it; by default the span of the bounds.
 
         Returns
         -------
@@ -114,12 +114,12 @@ class Phase:
         return self._new_symbol(name)
 
     def control(self, name: str, *, bounds: Any, unit: str = "", period: float | None = None, scale: float | None = None) -> ca.MX:
-        """Declare a control within finite bounds.
+        """Declare a control within finite `bounds` (lower, upper); `unit` and `scale` are as in `state`.
 
         Parameters
         ----------
         period : float, optional
-            For an angle that wraps around: the bounds are then one period wide, and the ends are the same value.
+            For an angle that wraps around, its period in the control's unit; the bounds must be exactly one period wide.
 
         Returns
         -------
@@ -159,7 +159,7 @@ class Phase:
         unit : str
             Of the expression and its limits, for tables, pictures and files.
         scale : float, optional
-            What counts as one in residuals. By default the span of two limits; of one limit, or an equality, 1 or a thousandth of its size,
+            Residuals are divided by it. By default the distance of two limits; of one limit, or an equality, 1 or a thousandth of its size,
             whichever is larger.
         """
         what = self._new_name("path", name)
@@ -197,8 +197,8 @@ class Phase:
     def split(self, condition: ca.MX, *, first: bool | None = None, name: str | None = None) -> Phase:
         """Cut the phase in two where a condition of its states switches, at a free time, so that nothing in either part jumps there.
 
-        This phase ends where both sides of the comparison are equal; the phase that is returned goes on from there. Each has the value of
-        the condition in its place, and a path constraint that keeps it on its side. Call it after `dynamics` and all paths, and before
+        This phase ends where both sides of the comparison are equal; the phase that is returned goes on from there. In each, its value on
+        that side replaces the condition, and a path constraint keeps the phase there. Call it after `dynamics` and all paths, and before
         `tf`, `final`, `integral`, `peak` and links to later phases are used. The second phase may be split again, by another condition.
 
         Parameters
@@ -279,7 +279,7 @@ class Phase:
         return after
 
     def guess(self, **values: Any) -> None:
-        """Say from where to start: states, controls, `t0` and `tf` by name. A number, a pair for a straight line, or (times, values)."""
+        """Set initial guesses of states, controls, `t0` and `tf` by name: a number, a pair (at t0, at tf), or (absolute times, values)."""
         times = {word: Variable(word, *limits) for word, limits in (("t0", self._t0_range), ("tf", self._tf_range))}
         known = self._states | self._controls | times
         for name, value in values.items():

@@ -31,9 +31,9 @@ class Problem:
     Attributes
     ----------
     default_transcription, default_evaluations, default_inner, default_start, default_verify
-        What is used by default, the last by the command line alone; a transcription of None: DFET on a mesh that is found. A case may
+        What calls use by default (`default_verify`: only the command line); transcription None: DFET on a mesh that is found. A case may
         set its own; a transcription, too, as a table of its method and settings, where phases have meshes of their own. The number of
-        evaluations is for studies and for searches that need one; MACS searches until it is done. None: it has to be stated there.
+        evaluations is for studies and for searches that need one; MACS searches until it is done. None: the call must state it.
 
     Examples
     --------
@@ -107,8 +107,8 @@ class Problem:
         """Add a static decision variable within finite bounds; returns its symbol, usable in any expression of any phase.
 
         `integer`: a whole number within the bounds, which belong to it, such as a number of engines or of revolutions. Gradient solves keep
-        those of their start; of up to 20 combinations of values each is solved, of more the optimum for real numbers, rounded, and then
-        neighbours of the best until none is better. Expressions have to be defined between whole numbers, too.
+        the values of their start; up to 20 combinations are all solved; with more, the optimum over real numbers is rounded, and then the
+        neighbours of the best are solved until none is better. Expressions have to be defined between whole numbers, too.
         """
         what = checks.new_name("parameter", name, self._parameters, f"problem '{self.name}'")
         limits = checks.whole(bounds, what) if integer else checks.interval(bounds, f"the bounds of {what}")
@@ -156,7 +156,7 @@ class Problem:
     def minimize(self, name: str, expr: Any, *, unit: str = "", scale: float | None = None) -> None:
         """Add an objective to be minimised: an expression of the same kind as a constraint's.
 
-        `scale` is the difference in it that counts as one where objectives are compared, as `macs verify` does; by default that is found
+        Differences of this objective are divided by `scale` where points are compared or verified; by default it is found
         from the front.
         """
         self._objective(name, expr, unit, "minimize", scale)
@@ -176,7 +176,7 @@ class Problem:
         return other
 
     def guess(self, **parameters: float) -> None:
-        """Say from where to start: parameters by name."""
+        """Set initial guesses of parameters, by name."""
         for name, value in parameters.items():
             what = f"problem '{self.name}': the guess of parameter '{name}'"
             if name not in self._parameters:

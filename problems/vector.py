@@ -207,9 +207,9 @@ class VectorProblem:
     Attributes
     ----------
     default_evaluations, default_verify : int or None, float
-        What studies, and searches that need a number, use by default: rows that a search evaluates (None: it has to be stated there; MACS
-        searches until it is done); and how much a point of a front may differ, in ranges of the front and in the constraints' scales, when
-        it is evaluated again, by the command line.
+        Number of rows that studies, and searches that need a number, evaluate by default (None: the call must state it; MACS
+        searches until it is done); and by how much, in ranges of the front and scales of constraints, a verified point may differ when
+        `macs verify` or `macs solve` evaluates it again.
 
     Examples
     --------
@@ -263,8 +263,8 @@ class VectorProblem:
         """Add a decision variable within finite bounds; with a `period`, bounds are one period wide, and values wrap around.
 
         `integer`: a whole number within the bounds, which belong to it. `choices`, in place of bounds: one of two or more different texts,
-        numbers or truth values, without an order. The function of rows as an array has whole numbers as floats there, and the number of the
-        choice, from 0; that of one row as a dict has an int, and the choice itself.
+        numbers or truth values, without an order. A `function` of arrays gets whole numbers as floats, and a choice as its number, counted
+        from 0; a `row` function gets an int, and the choice itself.
         """
         what = checks.new_name("variable", name, self._variables, f"problem '{self.name}'")
         if choices is not None:
@@ -287,7 +287,7 @@ class VectorProblem:
         self._variables[name] = Variable(name, lower, upper, checks.unit(unit, what), upper - lower, length, integer)
 
     def minimize(self, name: str, *, unit: str = "", scale: float | None = None) -> None:
-        """Add an objective to be minimised; `scale` is the difference in it that counts as one where objectives are compared, by default
+        """Add an objective to be minimised; its differences are divided by `scale` where points are compared, by default
         its range over the front."""
         self._objective(name, unit, "minimize", scale)
 

@@ -60,11 +60,11 @@ class Study:
     evaluations : int, "auto", or mapping, optional
         Budget of each run, or {label of a problem: budget}; "auto": searches of MACS end when they are done. Default: the problem's own.
     runs : int
-        Of each cell.
+        Number of runs of each cell, a combination of problem, transcription and solver.
     seed : int
         The one that all seeds are spawned from.
     reference : optional
-        The reference that reports measure fronts against; see `report`.
+        What reports measure fronts against: "union", "truth", a case, a file, or one by problem. Default: truth if known, else union.
     inner : str, optional
         The inner level, by name. Default: the problem's own, usually "auto".
     tolerance : float, default 1e-6
@@ -88,7 +88,7 @@ class Study:
         Label of the problem whose front reports simulate under the data of all others, which have the same variables and objectives; see
         `report.sensitivity`.
     dispersions : mapping, optional
-        Under which reports fly the points of every front, where the case knows how: settings of the case's own, such as `cases` and `seed`;
+        Settings of the case's dispersions, such as `cases` and `seed`, under which reports simulate the points of every front;
         see `report.sensitivity`.
     flights : bool, default True
         Whether reports show the flights that stand for each front.

@@ -179,8 +179,8 @@ class Point:
 
     @property
     def gain(self) -> float | None:
-        """What other controls would gain in all objectives together, to first order, by Pontryagin's minimum principle, as a part of what
-        counts as one in each: of the range of the front. None where it has no `costates` of a method on elements, or no `tolerances`.
+        """What other controls would gain in all objectives together, to first order, by Pontryagin's minimum principle, in the units that
+        `Front.verify` has: mostly ranges of the front. None where it has no `costates` of a method on elements, or no `tolerances`.
 
         A simulation does not see it: a point whose mesh has no edge at a switch of its controls simulates as it says, and is beaten by one
         that switches at the right time. Where states or path constraints are at their limits, and on singular arcs, it says nothing.
@@ -256,7 +256,7 @@ class Point:
         along its front, and this point in it.
 
         `front[i].plot()[0].figure.savefig("point.png")` writes the picture to a file. The title says whether a point is not feasible, not
-        verified or not simulated. Nodes of the first two are hollow.
+        verified or not simulated. Nodes of infeasible and unverified points are hollow.
 
         Parameters
         ----------

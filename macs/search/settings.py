@@ -161,10 +161,10 @@ class Settings:
         agents are not refined. A search that was ended by Ctrl-C, a time limit or a callback is not polished. A finished checkpoint is
         polished again each time.
     mesh_tolerance : float, default 1e-7
-        With `mesh="adaptive"`: largest difference between a simulated state and that of the transcription, in spans of its bounds, in
+        With `mesh="adaptive"`: largest difference of a simulated state from the transcription, relative to its range on the trajectory, in
         [1e-10, 1].
     polish_every : int, default 20
-        At most one gradient solve, those during the search included, for so many evaluations, at least 1; where the search chooses its
+        With `evaluations`, at most one gradient solve, search and polish together, for every so many of them; where the search chooses its
         inner level, `inner="auto"`, a polish may always make 60. It needs about six for each point of the archive; with more than two
         objectives, one more for each point that the archive may contain. Not among these are the solves for the ends of the front, and
         points between them, with which a search begins if it chooses its inner level, or if none of its first candidates is feasible.

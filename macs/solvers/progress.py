@@ -23,7 +23,7 @@ class Progress:
     evaluations : int
         So far.
     budget : int or None
-        Their largest number; None for a search that goes on until it is done.
+        Largest number of evaluations; None for a search that goes on until it is done.
     elapsed : float
         Seconds.
     archive : int

@@ -94,7 +94,7 @@ class Solver(SearchMethod):
         inner : str or InnerSolver, optional
             How candidates are made feasible: "auto" (MACS with gradients chooses between propagation, a quick projection and IPOPT, by
             what each has brought for its work; all others as by "projection"), "projection" (fast, and IPOPT if that fails), "propagate"
-            (not at all), "none" (not at all, and states are not propagated, but searched, too, with the dynamics as constraints), "ipopt"
+            (not: they are scored as they propagate), "none" (not: states are searched, too, with the dynamics as constraints), "ipopt"
             (the nearest feasible point), "ipopt-feasibility" (any feasible point), or an `InnerSolver` of your own. Default: the problem's
             own, usually "auto".
         tolerance : float
@@ -105,7 +105,7 @@ class Solver(SearchMethod):
             guess, see `transcription.Smooth`. Default: the problem's own; else the guess, if there is one, and independent draws; where
             MACS finds the mesh, also the optima of single objectives that this takes.
         verify : float, optional
-            How much a point may miss when it is simulated, in scales, and still be `verified`; see `Front.verify`. None: points are not
+            Largest error, scaled as in `Front.verify`, that an independent simulation may show in a `verified` point. None: points are not
             simulated.
         error : float, optional
             With two objectives: after the search, gradient solves add points between those found until the curve of the front errs by
@@ -150,9 +150,9 @@ class Solver(SearchMethod):
         "iterations_for" their iterations, and "kept_for" how many gave a new point or a better one.
 
         Without a number of evaluations, MACS searches in rounds, each with a polish if there are gradients and something new was found. It
-        ends when further work did not improve the front: 150 evaluations (2000 without gradients). Where a later round improved the front,
-        or an end of it has several optima and had not starts enough, they are twice as many, and at least a quarter of those before the
-        last improvement; in the second case they take some seconds of counted work, too. Later rounds begin with gradient solves from
+        ends after 150 evaluations (2000 without gradients) that did not improve the front. If a later round improved the front,
+        or an end with several optima had too few starts, it takes twice as many, and at least a quarter of the evaluations before the
+        last improvement; in the second case also some seconds of counted work. Later rounds begin with gradient solves from
         other starts. At its `ceiling` a search ends, too, and after half a minute or so of counted work on large programs;
         `stats["stopped"]` is "done" or "ceiling".
         Improved means: points that lie beyond the front by more than 0.001 of its ranges add 0.1 % to its hypervolume, or to the best

@@ -226,13 +226,13 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     solve.add_argument(
         "--start",
         metavar="KIND|FRONT.nc",
-        help="first candidates: smooth about the guess, uniform, without it, or a front's points (default: the problem's own)",
+        help="first candidates: smooth (about the guess), uniform (without the guess), or a front's points (default: the problem's own)",
     )
     solve.add_argument("--no-refine", action="store_true", help="search without derivatives of the objectives, as the paper does")
     solve.add_argument(
         "--mesh",
         metavar="KIND",
-        help="mended: solve points that a simulation does not confirm again, on finer meshes (default); adaptive: all; fixed: none",
+        help="which points are solved again on finer meshes: mended, those not verified (default); adaptive, all; fixed, none",
     )
     solve.add_argument(
         "--polish-on",
@@ -241,7 +241,7 @@ def _add_solve(commands: argparse._SubParsersAction[Parser]) -> None:
     )
     solve.add_argument("--prefer", metavar="FILE.json", help="a preference that guides the search: {method: ..., settings: {...}}")
     solve.add_argument(
-        "--verify", metavar="T", type=_verify, help="what simulated points may miss, or none: no simulation (default: the problem's, 0.001)"
+        "--verify", metavar="T", type=_verify, help="largest scaled error of verified points; none: no simulation (default: problem's)"
     )
     solve.add_argument("--checkpoint", metavar="FILE", help="keep the run there; killed or interrupted, the same call goes on where it was")
     solve.add_argument("--out", metavar="FRONT.nc", help="where to save the front (default: PROBLEM.nc, here, numbered if it exists)")
@@ -283,8 +283,8 @@ def _add_decide(commands: argparse._SubParsersAction[Parser]) -> None:
     decide.add_argument("--reference", metavar="NAME=VALUE", action="append", help="come as near as can be to this value; again for others")
     decide.add_argument("--prefer", metavar="FILE.json", help="a preference, as `to_dict` of macs.decisions makes it")
     decide.add_argument("--improve", metavar="NAME", help="then make this objective better than it is")
-    decide.add_argument("--to", metavar="VALUE", help="this much (default: as much as can be)")
-    decide.add_argument("--giving", metavar="OTHER=LIMIT", action="append", help="others may become worse until this; again for others")
+    decide.add_argument("--to", metavar="VALUE", help="the value to reach (default: the best possible)")
+    decide.add_argument("--giving", metavar="OTHER=LIMIT", action="append", help="OTHER may become worse, up to LIMIT; again for others")
     decide.add_argument("--workers", metavar="N", type=_workers, default="all", help=WORKERS)
     decide.add_argument("--alternatives", metavar="K", type=_positive, help="other choices about the one that is made")
     decide.add_argument("--out", metavar="CHOICE.nc", help="save the chosen point as a front")
@@ -305,7 +305,7 @@ def _add_study(commands: argparse._SubParsersAction[Parser]) -> None:
     run.add_argument("--solvers", metavar="LABEL", nargs="+", help="make the runs of these only (default: of all)")
     run.add_argument("--dask", metavar="ADDRESS", help="work on a Dask cluster, such as tcp://10.0.0.1:8786, instead")
     run.add_argument("--retry", action="store_true", help="make runs again, too, that ended with an exception")
-    run.add_argument("--fresh", action="store_true", help="make runs again, too, that are by other code than there is now")
+    run.add_argument("--fresh", action="store_true", help="repeat finished runs that were made by another version of the code, too")
     run.add_argument("--quick", action="store_true", help="at most 2 runs of 500 evaluations, in a folder of their own (out/NAME-quick)")
     run.add_argument("--trust", action="store_true", help=TRUST)
     status = _add(actions, "status", "how many runs of each cell there are, and why others failed")
@@ -329,7 +329,7 @@ def _add_report(commands: argparse._SubParsersAction[Parser]) -> None:
 
 
 def _add_serve(commands: argparse._SubParsersAction[Parser]) -> None:
-    serve = _add(commands, "serve", "the same page, live while a study runs, from a server on this machine that only reads")
+    serve = _add(commands, "serve", "a front or a study as a page of a read-only server on this machine, live while the study runs")
     serve.add_argument("source", metavar="DIR", help="a study's folder or name, a front, or a folder of fronts")
     serve.add_argument("--host", metavar="ADDRESS", default="127.0.0.1", help="0.0.0.0: all can read it (default: only this machine)")
     serve.add_argument("--port", metavar="N", type=_port, default=8642, help="0: any that is free (default: 8642)")

@@ -128,7 +128,7 @@ def additive_epsilon(front: Points, reference: Points, *, normalise: bool = True
 def hypervolume(front: Points, reference: Points, *, point: float = VOLUME_CORNER, normalise: bool = True) -> float:
     """Volume that the front dominates, up to `point` in each objective, in which the reference reaches from 0 to 1. 0 if it is empty.
 
-    With `normalise=False` the volume is in the objectives' own units, and `point` is how far beyond the reference's nadir it goes, 1.1 for
+    With `normalise=False` the volume is in the objectives' own units; `point` still counts from the ideal: 1.1 is beyond the nadir by
     a tenth of the reference's range.
 
     [parameters]

@@ -69,7 +69,7 @@ class Collocation(ElementsMethod):
     Raises
     ------
     ValueError
-        For numbers that are no positive integers, unknown points, controls of a higher degree than there are points for, or edges that do
+        For numbers that are not whole or too small, unknown points, controls of a higher degree than there are points for, or edges that do
         not increase from 0 to 1.
 
     Examples

@@ -47,7 +47,7 @@ class DFET(ElementsMethod):
     Raises
     ------
     ValueError
-        For numbers that are not positive integers, an unknown basis, or edges that do not increase from 0 to 1.
+        For numbers that are not whole or too small, an unknown basis, or edges that do not increase from 0 to 1.
 
     Examples
     --------

@@ -142,7 +142,7 @@ class Projection(InnerSolver):
 @dataclass(frozen=True)
 class Auto(Projection):
     """The same for those who do not choose. MACS divides its effort among propagation, some steps of Newton's method, of which most of what
-    it makes feasible takes no more, and a projection by IPOPT, by what each has brought for its work, see `macs.search.effort`."""
+    it makes feasible takes no more, and a projection by IPOPT, by what each has brought for its work, see `macs.search.trials`."""
 
     @property
     def ways(self) -> tuple[InnerSolver, ...]:

@@ -43,7 +43,7 @@ class Shooting(Transcription):
         Equal steps of that method on each interval.
     control : "constant", "linear" or "spline"
         Controls between their nodes: constant, with a value for each interval between two of them; straight lines or a cubic
-        spline through a value at each. They stay within their bounds at the nodes; but for splines, everywhere.
+        spline through a value at each. Constant and linear ones stay within their bounds everywhere, splines only at the nodes.
     control_nodes : int, optional
         Number of equally spaced nodes of the controls, both ends among them; by default those of the states. No step leads across one:
         where they fall into a step, it is divided. Among intervals of other lengths they lie in the same intervals, at the same parts.
@@ -128,7 +128,7 @@ class SingleShooting(Shooting):
     Parameters
     ----------
     nodes : int
-        Of each phase, equally spaced, both ends among them.
+        Number of nodes of each phase, at least 2, equally spaced, both ends included.
     scheme, steps, control, control_nodes, path_points
         See `Shooting`; `steps` are those between two nodes.
 
@@ -161,7 +161,7 @@ class MultipleShooting(Meshed, Shooting):
     Parameters
     ----------
     intervals : int
-        Of each phase, of equal length.
+        Number of intervals of each phase, of equal length.
     mesh : mapping, optional
         Phases that have intervals of their own: name -> (edges, order), edges relative to the phase, increasing from 0 to 1, and the order
         of the scheme; see `PhaseMesh`.
