@@ -199,7 +199,7 @@ class MeshedOptimum:
         """Why it is not good, or other remarks."""
         note = f"no solve converged: {self.solved.message}" if self.refinement is None else self.refinement.note
         behind = f"it is worse by {self.behind:.1e} of its size than what another one achieved when simulated" if self.behind else ""
-        exhausted = "it ended at the most work of a default call: name a transcription" if note and self.exhausted else ""
+        exhausted = "it used up the work of a call without a transcription: pass one" if note and self.exhausted else ""
         return "; ".join(words for words in (behind, note, exhausted) if words)
 
 

@@ -189,7 +189,7 @@ class KnownPoints:
         task = Scalarised(np.where(limited, limits, self.F.min(axis=0)), np.where(limited, 0.0, self.units), units=self.units)
         (found,) = self.solved(task)
         spare = self._words(np.where(limited & (limits - found.F > BETTER * self.units), limits, np.nan))
-        return replace(found, note=f"it is better than {spare}: with that, nothing else would be") if spare else found
+        return replace(found, note=f"it is better than {spare}: at that goal, nothing else would be better") if spare else found
 
     def least_sum(self, weights: np.ndarray) -> KnownPoint:
         """The point of the least sum of objectives in their ranges times weights (m,)."""
