@@ -13,7 +13,7 @@ FLOORS = ("problems", "transcription", "macs", "runs")
 MODULES = [path for floor in FLOORS for path in sorted((ROOT / floor).rglob("*.py"))]
 ROOMS = [path for path in MODULES if path.name not in ("__init__.py", "__main__.py")]
 TESTS = list((ROOT / "tests").rglob("*.py"))
-LINES, CODE, OF_TESTS = 53_747, 31_914, 36_161
+LINES, CODE, OF_TESTS = 53_747, 31_914, 36_197
 """Most lines of the floors, lines of their code, and lines of the tests: what there is, to go down to 40,000, 25,000 and 28,000.
 What raises one of them says so in the changelog."""
 TWICE = {"MACS"}

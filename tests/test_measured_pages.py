@@ -11,9 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from runs.batch.store import Store
 from runs.bench import BENCHES
 from runs.bench.contract import Row
 from runs.cli import main
+from runs.report.comparison import comparisons
+from runs.report.comparison_tables import runs_table
 from runs.report.page import PageHeader, digest_of_bench, digest_of_study
 from runs.report.published import with_count
 from runs.study import Study
@@ -118,6 +121,39 @@ def test_a_page_has_the_words_of_its_study(page):
         stated = [study.description, study.note, *study.pictures.values()]
         stated += [one[word] for one in study.paper for word in ("source", "note", "differs") if word in one]
         assert [words for words in stated if with_count(words, {"runs": study.runs}) not in text] == []
+
+
+SMALL = """name = "small"
+problems = ["goddard"]
+transcriptions = ["dfet:2x3"]
+evaluations = 100
+runs = 1
+seed = 1
+solvers = {MACS = {solver = "macs", mesh = "fixed"}, NSGA-II = {solver = "nsga2", population = 10}}
+"""
+
+
+@pytest.mark.slow
+def test_a_page_is_confirmed_by_first_runs_with_the_same_numbers(tmp_path, monkeypatch, capsys):
+    page, file = tmp_path / "small.md", tmp_path / "small.toml"
+    command = "macs study report out/small --page docs/measured/small.md"
+    file.write_text(SMALL)
+    monkeypatch.chdir(tmp_path)
+    for name in ("HERE", "STUDIES", "ROOT"):
+        monkeypatch.setattr(make, name, tmp_path)
+    monkeypatch.setattr(make, "_done", lambda words: main([words[0], words[1], str(file), *words[3:]]) == 0)
+    assert main(["study", "run", str(file)]) == 0
+    data = runs_table(comparisons(Store.open("out/small"), {})).csv().replace("NSGA-II,1,100", "NSGA-II,1,99")
+    for found in ("100", "99"):
+        page.with_suffix(".csv").write_text(data.replace("MACS,1,100", f"MACS,1,{found}"))
+        old = str(PageHeader.now(command, *make.now(command)))
+        page.write_text(re.sub(r"macs\.refinement \w+", "macs.refinement 0", old) + "\n\nData of all runs: [CSV](small.csv).\n")
+        assert make.confirm("small", command, 1) is (old in page.read_text()) is (found == "100")
+        said = "The code has changed since in macs.refinement; the first run of MACS was made again by it" in page.read_text()
+        assert said is (found == "100")
+    assert "'evaluations' of goddard, dfet:2x3, MACS, 1 is 100, on the page 99" in capsys.readouterr().out
+    finished = [run.finished for run in Store.open("out/small-again").runs()]
+    assert finished == [True, False], "NSGA-II does not depend on that code"
 
 
 def test_runs_without_a_point_are_infinitely_far_away_in_the_data():

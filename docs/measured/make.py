@@ -2,13 +2,16 @@
 which these are and why; names of pages make only these.
 
 A page is out of date once what states it, a study but its words or the modules of a benchmark, or the code that its results depend on is
-another than when they were made; comments and docstrings are no code. `pages.toml` has all pages, with the minutes of a processor that each
-takes. Killed or interrupted, the same command goes on with the runs that are missing; those in `out` by other code are made again.
+another than when they were made; comments and docstrings are no code. Where only code has changed, `--confirm` makes the first run of each
+solver that it may concern again: with the same numbers, the page stays, and says so. `pages.toml` has all pages, with the minutes of a
+processor that each takes. Killed or interrupted, the same command goes on with the runs that are missing; those in `out` by other code are
+made again.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import resource
 import shlex
 import subprocess
@@ -16,13 +19,18 @@ import sys
 import time
 import tomllib
 from collections.abc import Collection, Sequence
+from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
-from runs.batch.code import code_of_measures, merged
+from runs.batch.code import code_of_measures, merged, rooms
+from runs.batch.store import Store
 from runs.bench import BENCHES
 from runs.bench.contest import CONTESTS
 from runs.cli.parser import build_parser
-from runs.report.page import digest_of_bench, digest_of_study, print_standing, standing
+from runs.report.comparison import comparisons
+from runs.report.comparison_tables import runs_table
+from runs.report.page import PageHeader, digest_of_bench, digest_of_study, print_standing, standing
 from runs.study import Study
 
 HERE = Path(__file__).parent
@@ -113,6 +121,42 @@ def make(name: str, command: str, jobs: int) -> bool:
     return _done([*words, *(["--jobs", str(jobs), "--keep", f"out/{name}"] if words[1] in CONTESTS else [])])
 
 
+def confirm(name: str, command: str, jobs: int) -> bool:
+    """Make the first run of each solver that changed code concerns again, in a folder of its own. If its numbers are those of the page, the
+    page is by the code of now, and says so. Returns whether it is."""
+    page, (stated, code) = HERE / f"{name}.md", now(command)
+    text = page.read_text(encoding="utf-8")
+    header = PageHeader.read(text)
+    different = header.different(stated, code)
+    if stated != header.digest or not header.code or shlex.split(command)[1] != "study":
+        print(f"{name}: it has to be made again, since more than code has changed")
+        return False
+    study, out = Study.load(STUDIES / f"{name}.toml"), f"out/{name}-again"
+    own = {cell: rooms(study.code(cell)).keys() for cell in study.cells}
+    others = set(different).difference(*own.values())  # such as measures, or what is gone, which may concern all
+    solvers = list(dict.fromkeys(cell.solver for cell in study.cells if others or own[cell] & set(different)))
+    if not _done(["study", "run", name, "--out", out, "--runs", "1", "--jobs", str(jobs), "--fresh", "--solvers", *solvers]):
+        return False
+    found = comparisons(Store.open(ROOT / out), {})
+    known, again = (_by_run(one) for one in (page.with_suffix(".csv").read_text(encoding="utf-8"), runs_table(found).csv()))
+    for run, row in again.items():
+        # Against the union of all runs, or of a single point, these show little.
+        for word in ("evaluations", "gradient solves", "points", "GD", "IGD", "hypervolume"):
+            if row[word] != known[run][word] or not row[word]:
+                print(f"{name}: it has to be made again: '{word}' of {', '.join(run)} is {row[word]}, on the page {known[run][word]}")
+                return False
+    said = f"The code has changed since in {', '.join(different)}; the first run of {', '.join(solvers)} was made again by it"
+    text = text.replace("Data of all runs:", f"{said} on {date.today().isoformat()}, with the same numbers. Data of all runs:", 1)
+    made = replace(header, code=PageHeader.now(command, stated, code).code)
+    page.write_text(text.replace(str(header), str(made), 1), encoding="utf-8")
+    return True
+
+
+def _by_run(data: str) -> dict[tuple[str, ...], dict[str, str]]:
+    """The rows of CSV by problem, transcription, solver and number of the run."""
+    return {tuple(row.values())[:4]: row for row in csv.DictReader(data.splitlines())}
+
+
 def tidied(name: str) -> bool:
     """Remove pictures of earlier pages of this name that are not on it now; true."""
     text = (HERE / f"{name}.md").read_text(encoding="utf-8")
@@ -148,6 +192,7 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
     parser = argparse.ArgumentParser(prog=COMMAND, description="Make the pages of measured results that are out of date.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="pages to make, whether they are out of date or not")
     parser.add_argument("--check", action="store_true", help="make nothing, say which are out of date and why; exit code 1 if any is")
+    parser.add_argument("--confirm", action="store_true", help="only make again what shows whether code that has changed changes a number")
     parser.add_argument("--jobs", type=int, default=2, help="processes that work at a time (default: 2)")
     given = parser.parse_args(arguments)
     known = listed()
@@ -166,7 +211,7 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
     try:
         for number, name in enumerate(todo, 1):
             before, (stated, command) = seconds(), known[name]
-            failed += [] if make(name, command, given.jobs) else [name]
+            failed += [] if (confirm if given.confirm else make)(name, command, given.jobs) else [name]
             write_index()
             spent, elapsed = (seconds() - before) / 60, (time.perf_counter() - began) / 60
             print(
@@ -176,7 +221,7 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
         print("interrupted; the same command goes on from there", file=sys.stderr)
         return INTERRUPTED
     if failed:
-        print(f"not made: {', '.join(failed)}", file=sys.stderr)
+        print(f"not {'confirmed' if given.confirm else 'made'}: {', '.join(failed)}", file=sys.stderr)
     return int(bool(failed))
 
 
