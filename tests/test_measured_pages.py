@@ -141,7 +141,7 @@ def test_a_page_is_confirmed_by_first_runs_with_the_same_numbers(tmp_path, monke
     monkeypatch.chdir(tmp_path)
     for name in ("HERE", "STUDIES", "ROOT"):
         monkeypatch.setattr(make, name, tmp_path)
-    monkeypatch.setattr(make, "_done", lambda words: main([words[0], words[1], str(file), *words[3:]]) == 0)
+    monkeypatch.setattr(make, "_done", lambda words, folder: main([words[0], words[1], str(file), *words[3:]]) == 0)
     assert main(["study", "run", str(file)]) == 0
     data = runs_table(comparisons(Store.open("out/small"), {})).csv().replace("NSGA-II,1,100", "NSGA-II,1,99")
     for found in ("100", "99"):
@@ -151,7 +151,7 @@ def test_a_page_is_confirmed_by_first_runs_with_the_same_numbers(tmp_path, monke
         assert make.confirm("small", command, 1) is (old in page.read_text()) is (found == "100")
         said = "The code has changed since in macs.refinement; the first run of MACS was made again by it" in page.read_text()
         assert said is (found == "100")
-    assert "'evaluations' of goddard, dfet:2x3, MACS, 1 is 100, on the page 99" in capsys.readouterr().out
+    assert "'evaluations' of goddard, dfet:2x3, MACS, 1 is 100, not 99" in capsys.readouterr().out
     finished = [run.finished for run in Store.open("out/small-again").runs()]
     assert finished == [True, False], "NSGA-II does not depend on that code"
 

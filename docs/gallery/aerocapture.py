@@ -18,8 +18,8 @@ front.plot_variables()
 
 # What was learned
 #
-# The front has two pieces. Slender capsules, with a front angle of 20 deg, are more compact and need more heat shield; at 0.501
-# 1/m2 blunt ones take over, with front angles up to the bound of 70 deg, and the heat shield is lighter at once, 10.4 % for 12.2
-# %. Along the blunt piece the rear angle makes the compromise; the front angle is on its bound, and so nearly is the nose. The
+# The front has two pieces. Slender capsules, with a front angle of 20 deg, are more compact and need more heat shield; from
+# 0.502 1/m2 on blunt ones do better, with front angles up to the bound of 70 deg: the heat shield falls from 12.7 % at 0.477
+# 1/m2 to 10.7 %. Along the blunt piece the rear angle makes the compromise; the front angle is on its bound, and so nearly is the nose. The
 # slender ones have positive angles of attack, the blunt ones negative ones: a capsule and its mirror image are equally good. The
 # points are on the long reference front or a little above it, and the rear radius is not settled: it hardly counts.

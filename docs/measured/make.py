@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import os
 import resource
 import shlex
 import subprocess
@@ -36,7 +37,8 @@ from runs.study import Study
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 STUDIES = ROOT / "runs" / "studies"
-COMMAND = "python docs/measured/make.py"
+SCRIPT = "docs/measured/make.py"
+COMMAND = f"python {SCRIPT}"
 BEGINS, ENDS = "<!-- index: from papers.toml -->", "<!-- end of the index -->"
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
@@ -121,9 +123,9 @@ def make(name: str, command: str, jobs: int) -> bool:
     return _done([*words, *(["--jobs", str(jobs), "--keep", f"out/{name}"] if words[1] in CONTESTS else [])])
 
 
-def confirm(name: str, command: str, jobs: int) -> bool:
-    """Make the first run of each solver that changed code concerns again, in a folder of its own. If its numbers are those of the page, the
-    page is by the code of now, and says so. Returns whether it is."""
+def confirm(name: str, command: str, jobs: int, beside: Path | None = None) -> bool:
+    """Make the first run of each solver that changed code concerns again, in a folder of its own. If its numbers are those of the page, or
+    those by the checkout `beside` that made the page, the page is by the code of now, and says so. Returns whether it is."""
     page, (stated, code) = HERE / f"{name}.md", now(command)
     text = page.read_text(encoding="utf-8")
     header = PageHeader.read(text)
@@ -135,21 +137,37 @@ def confirm(name: str, command: str, jobs: int) -> bool:
     own = {cell: rooms(study.code(cell)).keys() for cell in study.cells}
     others = set(different).difference(*own.values())  # such as measures, or what is gone, which may concern all
     solvers = list(dict.fromkeys(cell.solver for cell in study.cells if others or own[cell] & set(different)))
-    if not _done(["study", "run", name, "--out", out, "--runs", "1", "--jobs", str(jobs), "--fresh", "--solvers", *solvers]):
+    run = ["study", "run", name, "--out", out, "--runs", "1", "--jobs", str(jobs), "--fresh", "--solvers", *solvers]
+    if beside is not None and not _made(page, beside):
+        print(f"{name}: the code in '{beside}' is not that which made the page")
         return False
-    found = comparisons(Store.open(ROOT / out), {})
-    known, again = (_by_run(one) for one in (page.with_suffix(".csv").read_text(encoding="utf-8"), runs_table(found).csv()))
-    for run, row in again.items():
+    if not all(_done(run, folder) for folder in (ROOT, beside) if folder):
+        return False
+    again, *old = (_by_run(runs_table(comparisons(Store.open(folder / out), {})).csv()) for folder in (ROOT, beside) if folder)
+    known = old[0] if old else _by_run(page.with_suffix(".csv").read_text(encoding="utf-8"))
+    for run_of, row in again.items():
         # Against the union of all runs, or of a single point, these show little.
         for word in ("evaluations", "gradient solves", "points", "GD", "IGD", "hypervolume"):
-            if row[word] != known[run][word] or not row[word]:
-                print(f"{name}: it has to be made again: '{word}' of {', '.join(run)} is {row[word]}, on the page {known[run][word]}")
+            if row[word] != known[run_of][word] or not row[word]:
+                print(f"{name}: it has to be made again: '{word}' of {', '.join(run_of)} is {row[word]}, not {known[run_of][word]}")
                 return False
-    said = f"The code has changed since in {', '.join(different)}; the first run of {', '.join(solvers)} was made again by it"
-    text = text.replace("Data of all runs:", f"{said} on {date.today().isoformat()}, with the same numbers. Data of all runs:", 1)
+    said = f"The code has changed since in {', '.join(different)}; the first run of {'; '.join(solvers)} was made again by it"
+    said += f" on {date.today().isoformat()}, with the same numbers{' as by the old code beside it' if beside else ''}."
+    text = text.replace("Data of all runs:", f"{said} Data of all runs:", 1)
     made = replace(header, code=PageHeader.now(command, stated, code).code)
     page.write_text(text.replace(str(header), str(made), 1), encoding="utf-8")
     return True
+
+
+def _made(page: Path, beside: Path) -> bool:
+    """Whether a page is current by the code of another checkout."""
+    done = subprocess.run([sys.executable, SCRIPT, "--check"], cwd=beside, env=_environment(beside), capture_output=True, text=True)
+    return any(line.startswith(f"{page.name}: ") and "OUT OF DATE" not in line for line in done.stdout.splitlines())
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    """That of processes which run the code of a checkout."""
+    return os.environ | {"PYTHONPATH": str(folder)}
 
 
 def _by_run(data: str) -> dict[tuple[str, ...], dict[str, str]]:
@@ -166,10 +184,11 @@ def tidied(name: str) -> bool:
     return True
 
 
-def _done(words: Sequence[str]) -> bool:
-    """Run a command of `macs` in a process of its own; whether it made what it should."""
+def _done(words: Sequence[str], folder: Path | None = None) -> bool:
+    """Run a command of `macs` in a process of its own, by the code of a checkout; whether it made what it should."""
+    folder = folder or ROOT
     print(f"$ macs {shlex.join(words)}", flush=True)
-    process = subprocess.Popen([sys.executable, "-m", "runs.cli", *words], cwd=ROOT)
+    process = subprocess.Popen([sys.executable, "-m", "runs.cli", *words], cwd=folder, env=_environment(folder))
     while True:
         try:
             process.wait()
@@ -193,8 +212,11 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help="pages to make, whether they are out of date or not")
     parser.add_argument("--check", action="store_true", help="make nothing, say which are out of date and why; exit code 1 if any is")
     parser.add_argument("--confirm", action="store_true", help="only make again what shows whether code that has changed changes a number")
+    parser.add_argument("--beside", metavar="FOLDER", type=Path, help="with --confirm: compare with a checkout that made the pages")
     parser.add_argument("--jobs", type=int, default=2, help="processes that work at a time (default: 2)")
     given = parser.parse_args(arguments)
+    if given.beside and not given.confirm:
+        parser.error("--beside is for --confirm")
     known = listed()
     if unknown := set(given.names) - set(known):
         parser.error(f"there is no page {', '.join(sorted(unknown))}; there are {', '.join(known)}")
@@ -211,7 +233,8 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
     try:
         for number, name in enumerate(todo, 1):
             before, (stated, command) = seconds(), known[name]
-            failed += [] if (confirm if given.confirm else make)(name, command, given.jobs) else [name]
+            done = confirm(name, command, given.jobs, given.beside) if given.confirm else make(name, command, given.jobs)
+            failed += [] if done else [name]
             write_index()
             spent, elapsed = (seconds() - before) / 60, (time.perf_counter() - began) / 60
             print(
