@@ -126,13 +126,19 @@ def make(name: str, command: str, jobs: int) -> bool:
 def confirm(name: str, command: str, jobs: int, beside: Path | None = None) -> bool:
     """Make the first run of each solver that changed code concerns again, in a folder of its own. If its numbers are those of the page, or
     those by the checkout `beside` that made the page, the page is by the code of now, and says so. Returns whether it is."""
-    page, (stated, code) = HERE / f"{name}.md", now(command)
-    text = page.read_text(encoding="utf-8")
+    page = HERE / f"{name}.md"
+    if shlex.split(command)[1] != "study" or not page.is_file():
+        print(f"{name}: it has to be made; only pages of studies that are there can be confirmed")
+        return False
+    text, (stated, code) = page.read_text(encoding="utf-8"), now(command)
     header = PageHeader.read(text)
     different = header.different(stated, code)
-    if stated != header.digest or not header.code or shlex.split(command)[1] != "study":
+    if stated != header.digest or not header.code:
         print(f"{name}: it has to be made again, since more than code has changed")
         return False
+    if not different:
+        print(f"{name}: it is by the code of now")
+        return True
     study, out = Study.load(STUDIES / f"{name}.toml"), f"out/{name}-again"
     own = {cell: rooms(study.code(cell)).keys() for cell in study.cells}
     others = set(different).difference(*own.values())  # such as measures, or what is gone, which may concern all
@@ -200,6 +206,14 @@ def _done(words: Sequence[str], folder: Path | None = None) -> bool:
     return process.returncode == 0 or (words[0] == "bench" and process.returncode == 1)  # targets that are missed are on its page
 
 
+def _checkout(folder: str) -> Path:
+    """A folder with a copy of this project."""
+    path = Path(folder).resolve()
+    if not (path / SCRIPT).is_file():
+        raise argparse.ArgumentTypeError(f"'{folder}' is no checkout of this project: it has no {SCRIPT}")
+    return path
+
+
 def seconds() -> float:
     """Of a processor, of all processes that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -212,7 +226,7 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help="pages to make, whether they are out of date or not")
     parser.add_argument("--check", action="store_true", help="make nothing, say which are out of date and why; exit code 1 if any is")
     parser.add_argument("--confirm", action="store_true", help="only make again what shows whether code that has changed changes a number")
-    parser.add_argument("--beside", metavar="FOLDER", type=Path, help="with --confirm: compare with a checkout that made the pages")
+    parser.add_argument("--beside", metavar="FOLDER", type=_checkout, help="with --confirm: compare with a checkout that made the pages")
     parser.add_argument("--jobs", type=int, default=2, help="processes that work at a time (default: 2)")
     given = parser.parse_args(arguments)
     if given.beside and not given.confirm:

@@ -127,7 +127,6 @@ def test_ctrl_c_while_a_point_is_solved_adds_no_note_to_that_point(coarse, monke
     assert all("not solved on a finer mesh" in point.note and "timeout" not in point.note for point in front)
 
 
-@pytest.mark.slow
 def test_a_point_that_is_refined_again_begins_where_it_was_left():
     front = sweep(load("goddard"), DFET(3, 2), points=3, starts=1, verify=None)
     job = FrontRefinement(front, Wanted(1e-7, feasible=1e-6), limit=1)
@@ -140,6 +139,7 @@ def test_a_point_that_is_refined_again_begins_where_it_was_left():
     assert good[0] <= good[1] and max(meshes) > 3
 
 
+@pytest.mark.slow
 def test_points_that_did_not_converge_stay_as_they_are():
     bad = front_with_a_bad_point()
     assert bad.refine_mesh(limit=1)[1].status == "infeasible"
