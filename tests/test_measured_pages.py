@@ -100,14 +100,11 @@ def test_pages_that_are_wrong_are_named(old, new, words, tmp_path, monkeypatch, 
     assert make.main(["--check"], tmp_path) == 1 and words in capsys.readouterr().out
 
 
-def test_a_page_of_a_study_is_of_its_file():
-    assert make.files_of("macs study report out/goddard-table3") == [ROOT / "runs" / "studies" / "goddard-table3.toml"]
-
-
 def test_every_page_is_listed_with_its_minutes():
     listed = make.listed()
     assert {page.stem for page in PAGES} <= listed.keys() and list(listed.values()) == sorted(listed.values())
     assert all(file.is_file() for _, command in listed.values() for file in make.files_of(command))
+    assert make.files_of("macs study report out/goddard-table3") == [ROOT / "runs" / "studies" / "goddard-table3.toml"]
     for text in (tomllib.loads(file.read_text())["description"] for file in make.STUDIES.glob("*.toml")):
         assert not re.search(r"\b\d+ runs", text), f"a page says how many runs there are, {text} need not"
     assert sum(minutes for minutes, _ in listed.values()) <= 16 * 60, "eight hours of two processors"
@@ -135,25 +132,29 @@ solvers = {MACS = {solver = "macs", mesh = "fixed"}, NSGA-II = {solver = "nsga2"
 
 @pytest.mark.slow
 def test_a_page_is_confirmed_by_first_runs_with_the_same_numbers(tmp_path, monkeypatch, capsys):
-    page, file = tmp_path / "small.md", tmp_path / "small.toml"
+    page, file, other = tmp_path / "small.md", tmp_path / "small.toml", tmp_path / "other"
     command = "macs study report out/small --page docs/measured/small.md"
+    other.mkdir()
     file.write_text(SMALL)
     monkeypatch.chdir(tmp_path)
     for name in ("HERE", "STUDIES", "ROOT"):
         monkeypatch.setattr(make, name, tmp_path)
-    monkeypatch.setattr(make, "_done", lambda words, folder: main([words[0], words[1], str(file), *words[3:]]) == 0)
+    monkeypatch.setattr(make, "_made", lambda page, beside: True)
+    monkeypatch.setattr(make, "_done", lambda words, at: monkeypatch.chdir(at) or main([words[0], words[1], str(file), *words[3:]]) == 0)
     assert main(["study", "run", str(file)]) == 0
     data = runs_table(comparisons(Store.open("out/small"), {})).csv().replace("NSGA-II,1,100", "NSGA-II,1,99")
-    for found in ("100", "99"):
+    for found, beside in (("100", None), ("99", None), ("99", other)):
         page.with_suffix(".csv").write_text(data.replace("MACS,1,100", f"MACS,1,{found}"))
         old = str(PageHeader.now(command, *make.now(command)))
         page.write_text(re.sub(r"macs\.refinement \w+", "macs.refinement 0", old) + "\n\nData of all runs: [CSV](small.csv).\n")
-        assert make.confirm("small", command, 1) is (old in page.read_text()) is (found == "100")
-        said = "The code has changed since in macs.refinement; the first run of MACS was made again by it" in page.read_text()
-        assert said is (found == "100")
+        confirmed = make.confirm("small", command, 1, beside)
+        assert confirmed is (old in page.read_text()) is (found == "100" or beside == other)
+        assert ("changed since in macs.refinement; the first run of MACS was made again by it" in page.read_text()) is confirmed
     assert "'evaluations' of goddard, dfet:2x3, MACS, 1 is 100, not 99" in capsys.readouterr().out
-    finished = [run.finished for run in Store.open("out/small-again").runs()]
-    assert finished == [True, False], "NSGA-II does not depend on that code"
+    assert "as by the old code beside it" in page.read_text()
+    for folder in (tmp_path, other):
+        finished = [run.finished for run in Store.open(folder / "out" / "small-again").runs()]
+        assert finished == [True, False], "NSGA-II does not depend on that code"
 
 
 def test_runs_without_a_point_are_infinitely_far_away_in_the_data():
@@ -213,11 +214,7 @@ def test_what_was_interrupted_makes_no_page(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [
-        (["--page", "a.md"], "of which one?"),
-        (["inner", "--page", "nowhere/a.md"], "there is no folder"),
-        (["inner", "--page", "a>b.md"], "'>'"),
-    ],
+    [(["--page", "a.md"], "of which"), (["inner", "--page", "nowhere/a.md"], "there is no folder"), (["inner", "--page", "a>b.md"], "'>'")],
 )
 def test_wrong_pages_are_refused_before_any_work(words, said, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)

@@ -126,43 +126,56 @@ def make(name: str, command: str, jobs: int) -> bool:
 def confirm(name: str, command: str, jobs: int, beside: Path | None = None) -> bool:
     """Make the first run of each solver that changed code concerns again, in a folder of its own. If its numbers are those of the page, or
     those by the checkout `beside` that made the page, the page is by the code of now, and says so. Returns whether it is."""
-    page = HERE / f"{name}.md"
-    if shlex.split(command)[1] != "study" or not page.is_file():
-        print(f"{name}: it has to be made; only pages of studies that are there can be confirmed")
+    page, out = HERE / f"{name}.md", f"out/{name}-again"
+    try:
+        different = _changed_code(page, command)
+        if not different:
+            print(f"{name}: it is by the code of now")
+            return True
+        if beside is not None and not _made(page, beside):
+            raise ValueError(f"the code in '{beside}' is not that which made the page")
+        solvers = _concerned(Study.load(STUDIES / f"{name}.toml"), different)
+        run = ["study", "run", name, "--out", out, "--runs", "1", "--jobs", str(jobs), "--fresh", "--solvers", *solvers]
+        if not all(_done(run, folder) for folder in (ROOT, beside) if folder):
+            return False
+        again, *old = (runs_table(comparisons(Store.open(folder / out), {})).csv() for folder in (ROOT, beside) if folder)
+        _compare(again, old[0] if old else page.with_suffix(".csv").read_text(encoding="utf-8"))
+    except ValueError as why:
+        print(f"{name}: {why}")
         return False
-    text, (stated, code) = page.read_text(encoding="utf-8"), now(command)
-    header = PageHeader.read(text)
-    different = header.different(stated, code)
-    if stated != header.digest or not header.code:
-        print(f"{name}: it has to be made again, since more than code has changed")
-        return False
-    if not different:
-        print(f"{name}: it is by the code of now")
-        return True
-    study, out = Study.load(STUDIES / f"{name}.toml"), f"out/{name}-again"
-    own = {cell: rooms(study.code(cell)).keys() for cell in study.cells}
-    others = set(different).difference(*own.values())  # such as measures, or what is gone, which may concern all
-    solvers = list(dict.fromkeys(cell.solver for cell in study.cells if others or own[cell] & set(different)))
-    run = ["study", "run", name, "--out", out, "--runs", "1", "--jobs", str(jobs), "--fresh", "--solvers", *solvers]
-    if beside is not None and not _made(page, beside):
-        print(f"{name}: the code in '{beside}' is not that which made the page")
-        return False
-    if not all(_done(run, folder) for folder in (ROOT, beside) if folder):
-        return False
-    again, *old = (_by_run(runs_table(comparisons(Store.open(folder / out), {})).csv()) for folder in (ROOT, beside) if folder)
-    known = old[0] if old else _by_run(page.with_suffix(".csv").read_text(encoding="utf-8"))
-    for run_of, row in again.items():
-        # Against the union of all runs, or of a single point, these show little.
-        for word in ("evaluations", "gradient solves", "points", "GD", "IGD", "hypervolume"):
-            if row[word] != known[run_of][word] or not row[word]:
-                print(f"{name}: it has to be made again: '{word}' of {', '.join(run_of)} is {row[word]}, not {known[run_of][word]}")
-                return False
     said = f"The code has changed since in {', '.join(different)}; the first run of {'; '.join(solvers)} was made again by it"
     said += f" on {date.today().isoformat()}, with the same numbers{' as by the old code beside it' if beside else ''}."
-    text = text.replace("Data of all runs:", f"{said} Data of all runs:", 1)
-    made = replace(header, code=PageHeader.now(command, stated, code).code)
+    text = page.read_text(encoding="utf-8").replace("Data of all runs:", f"{said} Data of all runs:", 1)
+    header = PageHeader.read(text)
+    made = replace(header, code=PageHeader.now(command, *now(command)).code)
     page.write_text(text.replace(str(header), str(made), 1), encoding="utf-8")
     return True
+
+
+def _changed_code(page: Path, command: str) -> list[str]:
+    """The modules that have changed since a page was made. Raises ValueError if the page has to be made for another reason."""
+    if shlex.split(command)[1] != "study" or not page.is_file():
+        raise ValueError("it has to be made; only pages of studies that are there can be confirmed")
+    header, (stated, code) = PageHeader.read(page.read_text(encoding="utf-8")), now(command)
+    if stated != header.digest or not header.code:
+        raise ValueError("it has to be made again, since more than code has changed")
+    return header.different(stated, code)
+
+
+def _concerned(study: Study, different: Collection[str]) -> list[str]:
+    """The solvers whose runs may depend on changed code: all, if it belongs to none in particular, such as measures."""
+    own = {cell: rooms(study.code(cell)).keys() for cell in study.cells}
+    others = set(different).difference(*own.values())
+    return list(dict.fromkeys(cell.solver for cell in study.cells if others or own[cell] & set(different)))
+
+
+def _compare(again: str, known: str) -> None:
+    """Raises ValueError if a run of one table, in CSV, has other numbers in the other; against a single point, indicators show little."""
+    rows = _by_run(known)
+    for run, row in _by_run(again).items():
+        for word in ("evaluations", "gradient solves", "points", "GD", "IGD", "hypervolume"):
+            if row[word] != rows[run][word] or not row[word]:
+                raise ValueError(f"it has to be made again: '{word}' of {', '.join(run)} is {row[word]}, not {rows[run][word]}")
 
 
 def _made(page: Path, beside: Path) -> bool:
