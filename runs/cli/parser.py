@@ -340,12 +340,7 @@ def _add_bench(commands: argparse._SubParsersAction[Parser]) -> None:
     bench = _add(commands, "bench", "ratios against the alternatives, measured side by side in one run")
     bench.formatter_class = argparse.RawDescriptionHelpFormatter
     bench.description = BENCH
-    bench.add_argument(
-        "what",
-        metavar="KIND",
-        nargs="?",
-        help="one of those above (default: all, which takes hours)",
-    )
+    bench.add_argument("what", metavar="KIND", nargs="?", help="one of those above (default: all, which takes hours)")
     bench.add_argument("only", metavar="PROBLEM", nargs="*", help="of corpus and curve: only these, by name or file.py:function")
     bench.add_argument("--problems", metavar="PROBLEM", nargs="+", default=(), help="further ones of the corpus: file.py:function")
     bench.add_argument("--against", metavar="FILE.csv", help="the corpus beside what an earlier run wrote with --csv")

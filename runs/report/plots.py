@@ -175,6 +175,7 @@ def convergence_figure(
     """An indicator over the cost of a run: the median of each solver's runs as a line, their quartiles as a band.
 
     Where half of the runs have nothing yet there is no line; where a quarter has nothing, the band is open towards the worse side.
+    Costs of runs that are more than a factor of ten apart are drawn on a logarithmic axis.
     """
     with style():
         figure = new_figure(COLUMN if len(histories) <= OVERLAID + 1 else PAGE, 2.5)
@@ -186,7 +187,8 @@ def convergence_figure(
         log = log and bool((values > 0).any())
         values = values[(values > 0) | (not log)]
         low, high = (values.min(), values.max()) if len(values) else (0.0, 1.0)
-        last = max(b.x[-1] for b in bands.values())
+        first, last = (extreme(b.x[-1] for b in bands.values()) for extreme in (min, max))
+        start = min(x for b in bands.values() for x in b.x if x > 0) if last > 10 * first > 0 else 0
         for k, (solver, b) in enumerate(bands.items()):
             color = COLORS[k % len(COLORS)]
             # A run that has ended keeps its front: its line goes on as far as the longest.
@@ -203,7 +205,7 @@ def convergence_figure(
             ax.set_ylim(low / (high / low) ** 0.05, high * (high / low) ** 0.05 if high > low else 2 * high)
         else:
             ax.set_ylim(low - 0.05 * (high - low or 1.0), high + 0.05 * (high - low or 1.0))
-        ax.set(xlim=(0, last or 1.0), xlabel=xlabel, ylabel=wrapped(ylabel, 2.0, 8.0))
+        ax.set(xscale="log" if start else "linear", xlim=(start, last or 1.0), xlabel=xlabel, ylabel=wrapped(ylabel, 2.0, 8.0))
         legend(figure, ax, "median, quartiles")
     return figure
 
