@@ -170,11 +170,13 @@ def _concerned(study: Study, different: Collection[str]) -> list[str]:
 
 
 def _compare(again: str, known: str) -> None:
-    """Raises ValueError if a run of one table, in CSV, has other numbers in the other; against a single point, indicators show little."""
+    """Raises ValueError if a run of one table, in CSV, has other numbers in the other, or no indicators, without a reference of its own."""
     rows = _by_run(known)
     for run, row in _by_run(again).items():
         for word in ("evaluations", "gradient solves", "points", "GD", "IGD", "hypervolume"):
-            if row[word] != rows[run][word] or not row[word]:
+            if not row[word]:
+                raise ValueError(f"it has to be made again: '{word}' needs more runs than the first, since its study states no reference")
+            if row[word] != rows[run][word]:
                 raise ValueError(f"it has to be made again: '{word}' of {', '.join(run)} is {row[word]}, not {rows[run][word]}")
 
 
