@@ -152,9 +152,8 @@ def test_a_page_is_confirmed_by_first_runs_with_the_same_numbers(tmp_path, monke
         assert ("changed since in macs.refinement; the first run of MACS was made again by it" in page.read_text()) is confirmed
     assert "'evaluations' of goddard, dfet:2x3, MACS, 1 is 100, not 99" in capsys.readouterr().out
     assert "as by the old code beside it" in page.read_text()
-    for folder in (tmp_path, other):
-        finished = [run.finished for run in Store.open(folder / "out" / "small-again").runs()]
-        assert finished == [True, False], "NSGA-II does not depend on that code"
+    again = [Store.open(folder / "out" / "small-again") for folder in (tmp_path, other)]
+    assert [[run.finished for run in store.runs()] for store in again] == 2 * [[True, False]], "NSGA-II does not depend on that code"
 
 
 def test_runs_without_a_point_are_infinitely_far_away_in_the_data():
@@ -214,7 +213,11 @@ def test_what_was_interrupted_makes_no_page(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(["--page", "a.md"], "of which"), (["inner", "--page", "nowhere/a.md"], "there is no folder"), (["inner", "--page", "a>b.md"], "'>'")],
+    [
+        (["--page", "a.md"], "of which one?"),
+        (["inner", "--page", "nowhere/a.md"], "there is no folder"),
+        (["inner", "--page", "a>b.md"], "'>'"),
+    ],
 )
 def test_wrong_pages_are_refused_before_any_work(words, said, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)

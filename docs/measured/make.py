@@ -128,7 +128,13 @@ def confirm(name: str, command: str, jobs: int, beside: Path | None = None) -> b
     those by the checkout `beside` that made the page, the page is by the code of now, and says so. Returns whether it is."""
     page, out = HERE / f"{name}.md", f"out/{name}-again"
     try:
-        different = _changed_code(page, command)
+        if shlex.split(command)[1] != "study" or not page.is_file():
+            raise ValueError("it has to be made; only pages of studies that are there can be confirmed")
+        text, (stated, code) = page.read_text(encoding="utf-8"), now(command)
+        header = PageHeader.read(text)
+        if stated != header.digest or not header.code:
+            raise ValueError("it has to be made again, since more than code has changed")
+        different = header.different(stated, code)
         if not different:
             print(f"{name}: it is by the code of now")
             return True
@@ -145,21 +151,10 @@ def confirm(name: str, command: str, jobs: int, beside: Path | None = None) -> b
         return False
     said = f"The code has changed since in {', '.join(different)}; the first run of {'; '.join(solvers)} was made again by it"
     said += f" on {date.today().isoformat()}, with the same numbers{' as by the old code beside it' if beside else ''}."
-    text = page.read_text(encoding="utf-8").replace("Data of all runs:", f"{said} Data of all runs:", 1)
-    header = PageHeader.read(text)
-    made = replace(header, code=PageHeader.now(command, *now(command)).code)
+    text = text.replace("Data of all runs:", f"{said} Data of all runs:", 1)
+    made = replace(header, code=PageHeader.now(command, stated, code).code)
     page.write_text(text.replace(str(header), str(made), 1), encoding="utf-8")
     return True
-
-
-def _changed_code(page: Path, command: str) -> list[str]:
-    """The modules that have changed since a page was made. Raises ValueError if the page has to be made for another reason."""
-    if shlex.split(command)[1] != "study" or not page.is_file():
-        raise ValueError("it has to be made; only pages of studies that are there can be confirmed")
-    header, (stated, code) = PageHeader.read(page.read_text(encoding="utf-8")), now(command)
-    if stated != header.digest or not header.code:
-        raise ValueError("it has to be made again, since more than code has changed")
-    return header.different(stated, code)
 
 
 def _concerned(study: Study, different: Collection[str]) -> list[str]:

@@ -287,7 +287,7 @@ def test_rows_are_flights_within_the_limits(reference_flights):
 
 @pytest.mark.slow
 def test_points_that_the_default_search_calls_verified_are_right():
-    """Each of those that stayed on the mesh of the search, by the equations that are written here; fewer evaluations, for their time."""
+    """Each of those that stayed on the mesh of the search, by the equations written here; 400 evaluations, not 700, to save time."""
     problem = load("reentry_case1")
     given = {"inner": problem.default_inner, "start": problem.default_start, "evaluations": 400}
     front = MACS(archive=5).solve(problem, seed=3, **given)
